@@ -173,7 +173,7 @@ def test_whatever_is_shown_says_which_machine_it_is_of(left, controller):
     assert "first-order model" not in page
     assert WITH_TABLE not in build_offline_html(LIVE.evaluate(START))
     for state in (left, both, with_pin(left)):
-        assert "without the table" in without_words(state)
+        assert "without the compensation table" in without_words(state)
         assert "HEIDENHAIN .COM and .CMA (X 9" in exported_words(LIVE.evaluate(state))
         bare = without_table(state)
         assert bare.controller is None

@@ -58,7 +58,7 @@ def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
     assert shown.count("adjust:apply") == 2
     assert re.search(r"<b>EC0Y 23\.1 → [\d.]+ µrad</b>.*max</th><td>51\.7 → ", shown)
     applied = part.take(state, "apply", "1")
-    assert applied.comparison.a.title == "before repair"
+    assert applied.comparison.a.title == "before adjust"
     ran(part, applied)
     assert "at their best values already" in section(part, applied)
     for index in ("9", "-1", "²", ""):

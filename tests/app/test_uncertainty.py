@@ -145,7 +145,7 @@ def test_pass_or_fail_fades_where_it_cannot_be_told():
 def drawn_mm(shape, ways):
     """Give where directions of a ball, [n, 3], are once it is scaled, turned and moved, mm."""
     ball = ways / np.linalg.norm(ways, axis=-1, keepdims=True)
-    told = shape.follows
+    told = shape.assigned
     points = SO3(told["wxyz"]).apply(ball * told["scale"]) + told["position"]
     return points / SCENE_PER_MM
 

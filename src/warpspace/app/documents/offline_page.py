@@ -95,11 +95,9 @@ def build_offline_html(
     return _build_page(picture.title, steps, shapes, about)
 
 
-def build_story_html(
-    state: AppState, provenance: About = None, known_scenes: KnownScenes = None
-) -> str:
+def build_story_html(state: AppState, provenance: About = None, scenes: KnownScenes = None) -> str:
     """Build the page of a story from the notes of a state."""
-    steps = _story_steps(state, known_scenes)
+    steps = _story_steps(state, scenes)
     first, grid = steps[0].picture, steps[0].picture.grid.nominal_mm
     alike = all(np.array_equal(step.picture.grid.nominal_mm, grid) for step in steps)
     # shapes that do not follow the steps are omitted
@@ -149,7 +147,7 @@ def _export(step: PageStep, shapes: Shapes) -> str:
             server.stop()
 
 
-def _story_steps(state: AppState, known_scenes: KnownScenes) -> list[PageStep]:
+def _story_steps(state: AppState, scenes: KnownScenes) -> list[PageStep]:
     notes, scene, live = story(state.review), state.resulting_scene(), LiveModel()
     if not notes:
         raise OptionError("no note of this scene is a step of a story")
@@ -157,9 +155,7 @@ def _story_steps(state: AppState, known_scenes: KnownScenes) -> list[PageStep]:
     for index, note in enumerate(notes):
         problem = ""
         try:
-            step_state, step_camera = (
-                reopened(state, note, known_scenes) if note.view else (state, None)
-            )
+            step_state, step_camera = reopened(state, note, scenes) if note.view else (state, None)
             evaluated = live.evaluate(_story_view(step_state, state, note))
             if steps and evaluated.shape != picture.shape:
                 raise OptionError("its machine has a different volume")
@@ -173,10 +169,13 @@ def _story_steps(state: AppState, known_scenes: KnownScenes) -> list[PageStep]:
 
 def _story_view(step_state: AppState, like: AppState, *notes: Note) -> AppState:
     """Return a state with the common settings of all steps: full surface, same background."""
-    look, machine = replace(step_state.look, surface="surface", isolines=False), step_state.machine
-    ground, machine = replace(step_state.shown, dark=like.shown.dark), replace(machine, shown=False)
     return replace(
-        step_state, look=look, shown=ground, machine=machine, nodes=like.nodes, review=notes
+        step_state,
+        look=replace(step_state.look, surface="surface", isolines=False),
+        machine=replace(step_state.machine, shown=False),
+        shown=replace(step_state.shown, dark=like.shown.dark),
+        nodes=like.nodes,
+        review=notes,
     )
 
 
@@ -238,12 +237,8 @@ def _step_pieces(step: PageStep, title: str) -> tuple[Markup, Markup, Markup]:
     headline = f"{legend.numbers_words(picture)} {legend.place_words(picture)}{within} · {factor}"
     subjects = [text for text in (picture.title, *legend.subject_words(picture)) if text != title]
     statistics = picture.statistics
-    numbers = {
-        "mean": statistics.mean_um,
-        "RMS": statistics.rms_um,
-        "P95": statistics.p95_um,
-        "max": statistics.max_um,
-    }
+    numbers = {"mean": statistics.mean_um, "RMS": statistics.rms_um, "P95": statistics.p95_um,
+               "max": statistics.max_um}  # fmt: skip
     point_texts = [label.text for label in point_labels(picture) if label.kind == "asked"]
     counted = "different in A and B" if picture.is_difference else "not zero"
     summary = f"{len(errors)} error{'' if len(errors) == 1 else 's'} {counted}"

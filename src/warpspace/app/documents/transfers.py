@@ -124,11 +124,9 @@ def shown_sides(picture: LivePicture, *, sheet: bool = False) -> list[AppState]:
 def has_sheet(picture: LivePicture) -> bool:
     """Return whether both sides of a comparison and their difference fit on one sheet."""
     compared = picture.compared
-    return (
-        compared is not None
-        and not compared.refused
-        and compared.sides[0].loop == compared.sides[1].loop
-    )
+    if compared is None or compared.refused:
+        return False
+    return compared.sides[0].loop == compared.sides[1].loop
 
 
 def file_stem(picture: LivePicture) -> str:

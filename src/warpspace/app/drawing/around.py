@@ -127,9 +127,7 @@ def _program(picture: LivePicture) -> Shapes:
     if path is None:
         return {}
     drawn, (values, scale) = path.drawn_mm(picture.exaggeration), picture.coloured(path)
-    linear = np.clip(
-        level_colours(diverging=scale.diverging), 0.0, 1.0
-    )  # range of line colours in viser
+    linear = np.clip(level_colours(diverging=scale.diverging), 0.0, 1.0)  # range of viser's lines
     colours = (255.0 * linear).astype(np.uint8)[colour_levels(scale, values)]
     line = index_of(picture.state.forms.get(AT_LINE, ""), MAX_LINES)
     marker = dots(drawn[path.of.line == line][-1:], POINT_MARKER * picture.size_mm, ACCENT)

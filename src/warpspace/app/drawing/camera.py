@@ -155,14 +155,10 @@ class TabCamera:
     def __init__(self, client: ClientHandle) -> None:
         self._camera = client.camera
         self.wanted: CameraMemory | None = None
-        self.view, self.orthographic = (
-            "iso",
-            False,
-        )  # selected last: a key of `VIEWS`, the telephoto lens
+        self.view, self.orthographic = "iso", False  # a key of `VIEWS`, the telephoto lens
         self.reported_room: Room | None = None
-        self._placements: tuple[
-            CameraMemory, ...
-        ] = ()  # latest; a page may still report an earlier one
+        # the latest ones, since a page may report an earlier one
+        self._placements: tuple[CameraMemory, ...] = ()
 
     def choose(
         self, picture: LivePicture, view: str | None = None, lens: bool | None = None

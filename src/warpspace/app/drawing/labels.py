@@ -132,11 +132,10 @@ def point_labels(picture: LivePicture) -> list[Label]:
     """List the labels of points of the volume, by priority."""
     worst, point = [*_worst(picture)], [*_point(picture)]
     for label, other in zip(worst, point, strict=False):
-        apart = np.linalg.norm(label.at_mm - other.at_mm)
-        if apart < TICK * picture.size_mm and other.text.startswith(
-            label.text.removeprefix("max ")
-        ):
-            worst = []  # same place
+        distance = np.linalg.norm(label.at_mm - other.at_mm)
+        same_text = other.text.startswith(label.text.removeprefix("max "))
+        if same_text and distance < TICK * picture.size_mm:
+            worst = []
     return [*worst, *point, *_measured(picture), *_names(picture), *_corners(picture)]
 
 

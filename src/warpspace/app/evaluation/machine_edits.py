@@ -188,7 +188,9 @@ def _read(scene: Scene, raw: Tables, like: definition.Machine) -> tuple[Scene, t
     """
     chain = definition.parse_chain(raw["machine"]["chain"])
     gone = {a: at for a, at in scene.workspace.positions.items() if a not in chain.axes}
-    raw["convention"]["reference_axis"] = "free"  # which axis that is may have changed
+    orders = {axis: scene.model.convention(axis).name for axis in chain.axes}
+    # the reference axis may have changed
+    raw["convention"] |= {"reference_axis": "free", "component_errors": orders}
     read = parse_scene(tomli_w.dumps(_without(raw, gone)), scene.name, "machine")
     curves = of_axes(scene.errors.functions, chain.axes)
     errors = ErrorSet({key: curve.without_axes(gone) for key, curve in curves.items()})
@@ -206,9 +208,7 @@ def _read(scene: Scene, raw: Tables, like: definition.Machine) -> tuple[Scene, t
         body_dir=named.body_dir,
         bodies={frame: body for frame, body in like.bodies.items() if frame not in gone},
     )
-    orders = tuple(pair for pair in scene.model.own_component_errors if pair[0] in chain.axes)
-    main = scene.model.component_errors
-    model = replace(read.model, machine=machine, component_errors=main, own_component_errors=orders)
+    model = replace(read.model, machine=machine)
     notes = (*scene_notes(machine, read.workspace, errors), *body_notes(machine))
     read = replace(read, model=model, errors=errors, notes=notes, part=scene.part)
     return (scene, ()) if read == scene else (read, tuple(_left_out(scene, gone)))
@@ -396,7 +396,7 @@ def _alike(*curves: ErrorFunction) -> bool:
     if any(curve.amplitude == 0.0 for curve in curves):
         return True
     first, second = (curve.with_amplitude(1.0) for curve in curves)
-    if any(curve.has_directions or {*curve.args} - {OWN} for curve in curves):
+    if any(curve.has_directions or {*curve.arguments} - {OWN} for curve in curves):
         return first == second
     at = np.linspace(*first.span, SAMPLES)
     return bool(np.abs(first.evaluate(at) - second.evaluate(at)).max() <= ALIKE)

@@ -379,10 +379,8 @@ class AppState:
     def own_curves(self) -> Mapping[str, ErrorFunction]:
         """The curves of the scene as opened, over the present working volume."""
         original, present = self.origin, self.scene
-        if (
-            original.workspace == present.workspace
-            and original.machine.axes == present.machine.axes
-        ):
+        same_axes = original.machine.axes == present.machine.axes
+        if same_axes and original.workspace == present.workspace:
             return original.errors.functions
         curves: dict[str, ErrorFunction] = {}
         for key, function in original.errors.functions.items():

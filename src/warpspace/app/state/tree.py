@@ -62,11 +62,8 @@ def _described(state: AppState, entry: "Field[Any]", prefix: str = "") -> Iterat
     else:
         for key, span in leaf.each(state).items():
             at = f"{path}.{key}"
-            label, linked = (
-                leaf.entry_label.format(name_of(key)),
-                leaf.linked.format(path=at, key=key),
-            )
-            unit = _unit(state, key)
+            label, unit = leaf.entry_label.format(name_of(key)), _unit(state, key)
+            linked = leaf.linked.format(path=at, key=key)
             yield replace(leaf, path=at, label=label, span=span, unit=unit, linked=linked)
 
 
@@ -182,9 +179,9 @@ def _with(branch: Any, names: Sequence[str], setting: Any) -> Any:
     if isinstance(branch, Mapping):
         entries = {**cast("Mapping[str, Any]", branch), name: setting}
         return {key: entry for key, entry in entries.items() if entry != ()}
-    return replace(
-        branch, **{name: _with(getattr(branch, name), path, setting) if path else setting}
-    )
+    if path:
+        setting = _with(getattr(branch, name), path, setting)
+    return replace(branch, **{name: setting})
 
 
 # --- Leaves with their own setters ----------------------------------------------------------------
@@ -320,9 +317,8 @@ def _read_point(leaf: Leaf, text: str) -> tuple[Any, str]:
     if len(parts) not in counts:
         raise Unreadable(f"expected three numbers{', or six with rotations' * (len(counts) > 1)}")
     numbers = [_number(leaf, part.strip().rstrip(",")) for part in parts]
-    return tuple(kept for kept, _ in numbers), "; ".join(
-        filter(None, (note for _, note in numbers))
-    )
+    notes = filter(None, (note for _, note in numbers))
+    return tuple(number for number, _ in numbers), "; ".join(notes)
 
 
 def _read_keys(leaf: Leaf, text: str, old: frozenset[str]) -> tuple[frozenset[str], str]:

@@ -96,11 +96,8 @@ def read_positions(text: str) -> dict[str, float] | None:
     pairs = _PAIR.findall(plain)
     positions = {name.upper(): float(value.replace(",", ".")) for name, value in pairs}
     is_complete = len(positions) == len(pairs) and _BETWEEN.fullmatch(_PAIR.sub("", plain))
-    return (
-        positions
-        if positions and is_complete and all(map(math.isfinite, positions.values()))
-        else None
-    )
+    is_finite = all(map(math.isfinite, positions.values()))
+    return positions if positions and is_complete and is_finite else None
 
 
 def read_list(text: str, span: Span) -> tuple[tuple[float, ...], str]:
