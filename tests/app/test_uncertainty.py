@@ -88,7 +88,7 @@ def test_numbers_have_their_uncertainty_beside_them():
     assert said.endswith(f"max {length:.1f} ± {worst:.1f} µm (k = 2)")
     assert point_labels(picture)[0].text == f"max {length:.1f} ± {worst:.1f} µm"
     # few degrees of freedom: Student's t for 95.45 % and 4 of them is 2.87 (GUM, table G.2)
-    few = LIVE.evaluate(state_of(SCENE + "freedom = 4\n"))
+    few = LIVE.evaluate(state_of(SCENE + "dof = 4\n"))
     assert numbers_words(few).endswith(f"± {worst / 2.0 * 2.869:.1f} µm (k = 2.87)")
 
 

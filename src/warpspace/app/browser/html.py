@@ -119,7 +119,6 @@ def ident(name: str) -> str:
 
 
 def field(label: object, control: Markup, name: str, unit: str = "", hint: str = "") -> Markup:
-    """Render a control with label and unit."""
     return fill(
         '<div class="ws-field"{title}><label for="{id}">{label}</label>{control}{unit}</div>',
         title=attributes(title=hint or None), id=ident(name), label=label, control=control,
@@ -192,6 +191,5 @@ def menu(heading: object, body: object, *, key: str, kind: str = "", hint: str =
 
 
 def rows(pairs: Iterable[tuple[object, object]], kind: str = "ws-rows") -> Markup:
-    """Render a table of labels and values, numbers right-aligned."""
     body = join(fill("<tr><th>{head}</th><td>{value}</td></tr>", head=h, value=v) for h, v in pairs)
     return tag("table", body, class_=kind)

@@ -50,7 +50,6 @@ class Page:
         self._sent.pop(place, None)
 
     def call(self, name: str, *values: object) -> None:
-        """Call a function of `warpspacePage`, or of the drawing's script as ``room.NAME``."""
         home = f"warpspacePage.{name}".replace("warpspacePage.room.", "warpspaceRoom.")
         self.run_script(f"{home}({', '.join(map(_spelt, values))});")
 

@@ -70,7 +70,6 @@ def serve_with(change: Callable[[dict[str, Any]], dict[str, Any]]) -> Generator[
 
 
 def message_buffer(client: ClientHandle) -> Any:
-    """Return the queue of messages to a client."""
     connection: Any = client._websock_connection  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
     return connection.get_message_buffer()
 

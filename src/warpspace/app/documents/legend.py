@@ -73,7 +73,6 @@ def marked(picture: LivePicture) -> dict[str, float]:
 
 
 def legend_html(picture: LivePicture) -> Markup:
-    """Render the colour bar with unit, ends, limit, mean, P95 and max."""
     scale, named = picture.scale, marks(picture)
     names = join(
         tag("i", mark.text, style=f"bottom:{100.0 * mark.name_at:.2f}%",
@@ -222,12 +221,8 @@ def picture_conditions(picture: LivePicture) -> tuple[str, ...]:
         conditions = conditions_of_both(*map(of, picture.compared.sides))
     else:
         conditions = of(picture.drawn_state)
-    return (
-        *conditions,
-        *order_conditions(picture),
-        *range_conditions(picture),
-        *faded_words(picture),
-    )
+    colours = range_conditions(picture) + faded_words(picture)
+    return (*conditions, *order_conditions(picture), *colours)
 
 
 def faded_words(picture: LivePicture) -> tuple[str, ...]:
@@ -241,7 +236,6 @@ def faded_words(picture: LivePicture) -> tuple[str, ...]:
 
 
 def range_conditions(picture: LivePicture) -> tuple[str, ...]:
-    """Remark on a colour range fixed by the user."""
     scale = picture.scale
     fixed = picture.state.look.range_mode == "fixed"
     return (formatting.range_words(scale.low, scale.high, scale.unit),) if fixed else ()

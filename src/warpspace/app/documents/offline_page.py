@@ -69,7 +69,6 @@ class PageStep:
 
     @property
     def point_mm(self) -> Array:
-        """Place of the note's point in the drawing."""
         return next((label.at_mm for label in note_labels(self.picture)), np.array(AWAY_MM))
 
 
@@ -96,7 +95,6 @@ def build_offline_html(
 
 
 def build_story_html(state: AppState, provenance: About = None, scenes: KnownScenes = None) -> str:
-    """Build the page of a story from the notes of a state."""
     steps = _story_steps(state, scenes)
     first, grid = steps[0].picture, steps[0].picture.grid.nominal_mm
     alike = all(np.array_equal(step.picture.grid.nominal_mm, grid) for step in steps)
@@ -261,15 +259,12 @@ def _step_pieces(step: PageStep, title: str) -> tuple[Markup, Markup, Markup]:
 
 
 def _error_rows(picture: LivePicture) -> list[tuple[str, str, str]]:
-    """List errors that are not zero, or differ in A and B: key, descriptive name, value, unit."""
     compared = picture.compared.sides if picture.compared and picture.is_difference else ()
     sides = [side.active_scene().errors.functions for side in compared or (picture.drawn_state,)]
     error_rows: list[tuple[str, str, str]] = []
     for row in map(parameter, dict.fromkeys(key for side in sides for key in side)):
         functions = [side.get(row.key) for side in sides]
-        spelt = [
-            f"{curve.amplitude:+g}" if curve and curve.amplitude else "0" for curve in functions
-        ]
+        spelt = [f"{of.amplitude:+g}" if of and of.amplitude else "0" for of in functions]
         value = f"A {spelt[0]}, B {spelt[1]}" if compared else spelt[0]
         if (functions[0] != functions[1]) if compared else value != "0":
             error_rows.append((row.key, row.name, f"{value} {row.unit}".replace("-", "−")))

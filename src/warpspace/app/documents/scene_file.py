@@ -57,7 +57,6 @@ def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
 
 
 def open_text(text: str, name: str, source: str, *, single: bool = False) -> Opened:
-    """Build the state of an uploaded scene file."""
     scene = _recognised(parse_scene(text, name, source, folder=None))
     line = settings_of(text)
     return with_settings(start_state(scene), line, single=single), camera_of(line)
@@ -76,15 +75,11 @@ def _find(name: str, scenes: KnownScenes) -> Scene | None:
 
 
 def _recognised(scene: Scene) -> Scene:
-    """Restore the bodies of a library machine that differs in travels and directions only."""
     machine = scene.machine
     twin = known_alike(machine)
     if twin is None:
         return scene
-    bodies, gantries = (
-        machine.bodies or twin.bodies,
-        machine.gantries or twin.gantries,
-    )
+    bodies, gantries = machine.bodies or twin.bodies, machine.gantries or twin.gantries
     same = replace(twin, axes=machine.axes, bodies=bodies, gantries=gantries)
     return replace(scene, model=replace(scene.model, machine=same))
 
@@ -133,18 +128,11 @@ def _read_link(link: str, scenes: KnownScenes, *, single: bool = False) -> Opene
     pairs = dict(_pairs(link))
     if PACKED in pairs:
         name = safe_name(pairs.get(NAME, ""), "link")
-        return open_text(
-            _unpack(pairs[PACKED]),
-            name,
-            "the scene in the link",
-            single=single,
-        )
+        return open_text(_unpack(pairs[PACKED]), name, "the scene in the link", single=single)
     name = pairs.pop(SCENE, "")
     scene = _find(name, scenes)
     if scene is None:
-        raise OptionError(
-            f"the link names the scene {name[:LONGEST_NAME]!r}, which is not available"
-        )
+        raise OptionError(f"the link names an unknown scene {name[:LONGEST_NAME]!r}")
     line = urlencode(pairs)
     return with_settings(start_state(scene), line, scenes, single=single), camera_of(line)
 
@@ -182,13 +170,8 @@ def settings_line(
 
 
 def with_settings(
-    state: AppState,
-    line: str,
-    scenes: KnownScenes = None,
-    *,
-    single: bool = False,
+    state: AppState, line: str, scenes: KnownScenes = None, *, single: bool = False
 ) -> AppState:
-    """Apply a line of settings to a state."""
     pairs = [pair for pair in _pairs(line) if not (single and pair[0].startswith(PREFIX))]
     state, unread = _with_sides(state, dict(pairs), scenes), list[str]()
     for name, text in pairs:

@@ -24,7 +24,6 @@ def pack(link: str) -> str:
 
 
 def unpack(word: str) -> str:
-    """Decode a word of `pack`."""
     try:
         return base64.urlsafe_b64decode(word + "=" * (-len(word) % 4)).decode()
     except (binascii.Error, ValueError):
@@ -130,7 +129,6 @@ def has_sheet(picture: LivePicture) -> bool:
 
 
 def file_stem(picture: LivePicture) -> str:
-    """Build the file name of a picture, without ending; it mentions a compensation table."""
     compared, chosen = picture.compared, picture.state.comparison
     if compared is None or drawn_tables(picture.state):
         tail = "_with_table" if drawn_tables(picture.state) else ""
@@ -155,6 +153,5 @@ def exported_words(picture: LivePicture) -> str:
         return "The figure shows the tilts of the tool axis as needles on the box." if tilts else ""
     what = "the position errors of " if tilts else ""
     sheet = f" The figure shows {what}A, B and B − A on one sheet." if has_sheet(picture) else ""
-    return (
-        f"Pictures and exports show {compared.title}.{sheet} Save and Link include the comparison."
-    )
+    pictures = f"Pictures and exports show {compared.title}."
+    return f"{pictures}{sheet} Save and Link include the comparison."

@@ -49,7 +49,6 @@ def ghost_dashes(picture: LivePicture) -> Array:
 
 
 def surface(picture: LivePicture) -> SceneNode:
-    """Draw the coloured map of a picture, or its grid lines."""
     has_lines, without_part = picture.state.look.surface == "grid", picture.state.part.is_empty
     # grid lines would hide a part
     mesh = line_mesh(picture, grid=without_part) if has_lines else map_mesh(picture)
@@ -121,7 +120,6 @@ class BoxLayer:
         self._behind = True
 
     def synchronise(self, picture: LivePicture) -> None:
-        """Update viser's nodes to the drawn picture."""
         if self._behind:
             self._show_all(picture)
 

@@ -55,7 +55,6 @@ class Room:
 
 
 def first_room(page_width: float, page_height: float) -> Room:
-    """Estimate the size until the page reports it."""
     phone = page_width <= PHONE_PX
     width = page_width - (0 if phone else COLUMNS_PX)
     height = page_height * (PHONE_SHARE if phone else 1.0) - TOP_PX
@@ -100,7 +99,6 @@ class CameraMemory:
     fov_rad: float
 
     def is_near(self, other: "CameraMemory") -> bool:
-        """Return whether the camera has not been moved by hand."""
         least = MOVED * float(np.linalg.norm(np.subtract(self.position, self.look_at)))
         first, second = ((*at.position, *at.look_at, at.fov_rad) for at in (self, other))
         return np.allclose(first, second, rtol=0.0, atol=least)
@@ -139,7 +137,6 @@ def fit_camera(
 
 
 def clipping(position: Array, points: Array, *, orthographic: bool) -> tuple[float, float]:
-    """Choose near and far planes, as distances from a camera."""
     distance = float(np.linalg.norm(position - points.reshape(-1, 3), axis=-1).max())
     return (0.02 * distance if orthographic else NEAR), max(FAR, 5.0 * distance)
 
@@ -193,7 +190,6 @@ class TabCamera:
 
     @property
     def room(self) -> Room:
-        """Size of the drawing, as reported by the page or estimated."""
         camera = self._camera
         return self.reported_room or first_room(camera.image_width, camera.image_height)
 
@@ -219,7 +215,6 @@ class TabCamera:
         self._clip(memory, np.array([memory.look_at]) / SCENE_PER_MM)
 
     def fit(self, picture: LivePicture) -> None:
-        """Fit box, traces and axes to the space between the panels."""
         points, room = self._room_mm(picture), self.room
         fitted = fit_camera(
             points, room.aspect, VIEWS[self.view], self._fov_deg, margins=room.margins

@@ -93,7 +93,6 @@ def _axes(of: Identity, away: float) -> tuple[AxisLabels, ...]:
 
 
 def axes_room_mm(picture: LivePicture) -> Array:
-    """Return points around the nominal box, axes and traces, [n, 3], mm."""
     low, high = picture.grid.bounds_mm
     away = (AWAY + TICK) * picture.size_mm
     x, y, z = (low[0] - away, high[0] + away), (low[1] - away, high[1]), (low[2], high[2])

@@ -46,7 +46,6 @@ def machine(picture: LivePicture, turned: Mapping[str, float]) -> Shapes:
 
 
 def ghost_machine(picture: LivePicture) -> Shapes:
-    """Draw the nominal machine, nearly transparent."""
     rgb, edge = (colour(picture, name) for name in ("ghost_body", "ghost_body_edge"))
     shapes: dict[str, SceneNode | None] = {}
     for part in drawn_bodies(picture, nominal=True):
@@ -73,9 +72,7 @@ class MovingLayer:
         self._ghost_of: object = None
         self.position: dict[str, float] = {}  # of the animated axis, degrees; empty while stopped
         self.moved: Callable[[], None] = lambda: None
-        self.clamp: Callable[[str], None] = lambda _place: (
-            None
-        )  # receives the placement after a drag
+        self.clamp: Callable[[str], None] = lambda _place: None  # called after a drag
         self._turned_deg = 0.0
         self._turned_at: float | None = None  # None while stopped
         self.show(picture)
@@ -110,7 +107,6 @@ class MovingLayer:
             self.clamp(",".join(map(repr, place)))
 
     def _draw_ghost(self, picture: LivePicture) -> None:
-        """Draw the ghost of the machine where it has changed; errors do not move it."""
         state = picture.state
         on = state.machine.ghost and not state.machine.shown
         of = on and (

@@ -69,12 +69,10 @@ class Nodes:
         return handle
 
 
-def _same(before: Mapping[str, Any], after: Mapping[str, Any]) -> bool:
+def _same(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
     return all(
-        np.array_equal(value, before[word])
-        if isinstance(value, np.ndarray)
-        else value == before[word]
-        for word, value in after.items()
+        np.array_equal(value, old[word]) if isinstance(value, np.ndarray) else value == old[word]
+        for word, value in new.items()
     )
 
 
@@ -96,7 +94,6 @@ def mesh(vertices_mm: Array, triangles: NDArray[Any], rgb: Rgb, **options: objec
 
 
 def ball(at_mm: Array, radius_mm: float, rgb: Rgb) -> SceneNode:
-    """Draw the marker of a point, [3]."""
     constant = {**UNLIT, "scale": radius_mm * SCENE_PER_MM}
     return SceneNode("add_icosphere", constant, {"position": at_mm * SCENE_PER_MM, "color": rgb})
 
@@ -112,7 +109,6 @@ def ellipsoid(at_mm: Array, square_mm2: Array, rgb: Rgb, opacity: float) -> Scen
 
 
 def dots(at_mm: Array, size_mm: float, rgb: Rgb) -> SceneNode | None:
-    """Draw points, [n, 3], as flat circles."""
     constant = {
         "point_size": size_mm, "point_shape": "circle", "point_shading": "flat",
         "precision": "float32", "scale": SCENE_PER_MM,

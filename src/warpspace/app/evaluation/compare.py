@@ -124,7 +124,6 @@ def _shared_scale(state: AppState, maps: Sequence[LivePicture]) -> ColourScale:
 
 
 def with_sides(state: AppState, a: Side, b: Side | None) -> AppState:
-    """Compare two sides; None for b ends the comparison."""
     if b is None:
         return replace(state, comparison=state.comparison.off())
     return replace(state, comparison=replace(state.comparison, a=a, b=b))
@@ -174,7 +173,6 @@ def with_proposal(state: AppState, scene: Scene, title: str) -> AppState:
 
 
 def with_applied(state: AppState, scene: Scene, before: str) -> AppState:
-    """Apply a proposal; the state before is A of a comparison."""
     return applied(with_before(state, Side(before, plain_state(state))), scene)
 
 
@@ -190,7 +188,6 @@ def table_words(state: AppState) -> str:
 
 
 def drawn_tables(state: AppState) -> tuple[str, ...]:
-    """List the tables of a state and of the sides of its comparison, each once."""
     sides = (Side(), state.comparison.a, state.comparison.b or Side())
     tables = [(side.state or state).controller for side in sides]
     return tuple(dict.fromkeys(table.label for table in tables if table is not None))

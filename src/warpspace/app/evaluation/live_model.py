@@ -99,7 +99,6 @@ class LiveModel:
     def _uncertainty(
         self, state: AppState, grid: Grid, field: ErrorField
     ) -> FieldUncertainty | None:
-        """Evaluate the uncertainty of errors over a grid; the covariance is cached."""
         scene = state.scene
         if scene.covariance is None and not scene.uncertainty:
             return None

@@ -40,7 +40,6 @@ class Compared:
 
     @property
     def title(self) -> str:
-        """Label of the drawn side, or of the difference."""
         a, b = self.titles
         if self.view != "difference":
             return f"A: {a}" if self.view == "a" else f"B: {b}"
@@ -113,7 +112,6 @@ class LivePicture(Picture):
 
     @property
     def title(self) -> str:
-        """Title of the scene, of a side of a comparison, or of the difference."""
         return self.state.scene.title if self.compared is None else self.compared.title
 
     def describe_sides(self, word: Callable[[AppState], str]) -> str:

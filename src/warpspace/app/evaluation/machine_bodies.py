@@ -88,17 +88,13 @@ def played_position(state: AppState, angle_deg: float) -> dict[str, float]:
 
 def points_on_traces(picture: LivePicture, position: Mapping[str, float]) -> tuple[Array, Array]:
     """Interpolate the traced points at a position of the animated axis, [n, 3] each, mm."""
-    interpolated: list[Array] = []
+    interpolated: list[list[float]] = []
     for lines in picture.traces:
         for number, trace in enumerate(lines.group.traces):
             if trace.axis in position:
                 sweep, at = lines.group.coordinates[trace.axis][number], position[trace.axis]
-                columns = np.concatenate(
-                    [lines.nominal_mm[number], lines.actual_mm[number]], axis=1
-                )
-                interpolated.append(
-                    np.array([np.interp(at, sweep, column) for column in columns.T])
-                )
+                columns = np.hstack([lines.nominal_mm[number], lines.actual_mm[number]]).T
+                interpolated.append([float(np.interp(at, sweep, column)) for column in columns])
     points = np.reshape(interpolated, (-1, 6))
     return points[:, :3], points[:, 3:]
 

@@ -48,7 +48,6 @@ MAX_QUOTED = 30  # characters of a typed text in a message
 
 
 def tables_of(scene: Scene) -> Tables:
-    """Return the tables that can be edited frame by frame."""
     machine, fixed = scene.machine, dict.fromkeys(definition.FIXED_FRAMES, definition.ORIGIN)
     offset = {name: axis.offset_mm for name, axis in machine.axes.items()}
     rotation = {name: axis.rotation_deg for name, axis in machine.axes.items()}
@@ -165,7 +164,6 @@ def _rearrange(raw: Tables, scene: Scene, chain: definition.Chain) -> None:
 
 
 def _with_machine(scene: Scene, other: Scene) -> tuple[Scene, tuple[str, ...]]:
-    """Replace machine, working volume and points of a scene by those of another one."""
     document = _document(other)
     raw = _document(scene) | {key: document[key] for key in ("machine", "workspace", "points_mm")}
     return _read(scene, raw, other.machine)
@@ -242,7 +240,6 @@ def known_alike(machine: definition.Machine) -> definition.Machine | None:
 
 
 def of_axes(table: Mapping[str, T], axes: Collection[str]) -> dict[str, T]:
-    """Select the entries of a table of parameters that belong to some axes."""
     return {key: value for key, value in table.items() if parameter(key).axis in axes}
 
 
@@ -372,7 +369,6 @@ def guide_errors(state: AppState, gantry: definition.Gantry) -> tuple[float, flo
 def with_guide_error(
     state: AppState, gantry: definition.Gantry, guide: int, value_um: float
 ) -> AppState:
-    """Set the positioning error of one guide; the other one is unchanged."""
     present = guide_errors(state, gantry)
     if present is None:
         raise OptionError(

@@ -50,12 +50,10 @@ class PointExplanation:
 
     @property
     def is_corrected(self) -> bool:
-        """True where a compensation table corrects the drawn point."""
         return not np.array_equal(self.drawn_um, self.explanation.error_um)
 
     @property
     def length_um(self) -> float:
-        """Length of the explained error."""
         return float(np.linalg.norm(self.explanation.error_um))
 
     @cached_property
@@ -122,7 +120,6 @@ def _on_traces(picture: LivePicture, origin: Array, unit: Array) -> Iterator[tup
 
 
 def pick_line(picture: LivePicture, origin_mm: Array, direction: Array) -> int | None:
-    """Find the line of the program at a ray through its drawn path."""
     path = picture.path
     if path is None or not direction.any():
         return None
@@ -139,7 +136,6 @@ def _denser(samples: Array) -> Array:
 
 
 def explain_point(state: AppState, picked: Picked, exaggeration: float) -> PointExplanation:
-    """Evaluate error and contributions of a picked point."""
     scene, model = state.active_scene(), state.scene.model
     stands = {**state.scene.workspace.positions, **state.positions, **picked.at}
     at = {name: stands.get(name, 0.0) for name in model.machine.axes}
@@ -159,9 +155,8 @@ def explain_point(state: AppState, picked: Picked, exaggeration: float) -> Point
         nominal = explanation.nominal_mm
         drawn_um = state.controller.field(coordinates, nominal, scene, loop, nominal).error_um
     drawn, view = deform(explanation.nominal_mm + shift, drawn_um, exaggeration), state.view(loop)
-    uncertainty = field_uncertainty(
-        scene, explanation.error_um, coordinates, view, explanation.nominal_mm
-    )
+    error, nominal = explanation.error_um, explanation.nominal_mm
+    uncertainty = field_uncertainty(scene, error, coordinates, view, nominal)
     return PointExplanation(at, loop, explanation, shift, drawn, drawn_um, uncertainty)
 
 
@@ -192,7 +187,6 @@ def drawn_field(
 
 
 def with_picked(state: AppState, picked: Picked | None) -> AppState:
-    """Pick a point, or none; the selected contribution stays while there is a point."""
     return replace(state, picked=picked, lever=state.lever if picked else "")
 
 
@@ -237,9 +231,8 @@ def _measure_distance(of: Identity) -> tuple[DistanceResult, Array, Array] | Non
     state, option_texts = picture.drawn_state, option_values(picture.state, Distance.name)
     scene = state.active_scene()
     try:
-        distance = replace(
-            read_form(Distance, Distance.options(), option_texts, scene), loop=state.loop
-        )
+        distance = read_form(Distance, Distance.options(), option_texts, scene)
+        distance = replace(distance, loop=state.loop)
         if not (distance.start and distance.end):
             return None
         at = distance.places(scene, distance.corner)

@@ -51,7 +51,6 @@ class SceneOverlay(Generic[T]):
     error_um: NDArray[Any]  # [n, 3]; of the tool against the workpiece
 
     def drawn_mm(self, exaggeration: float) -> NDArray[Any]:
-        """Compute the displaced points, [n, 3], exaggerated."""
         return self.nominal_mm + np.float32(exaggeration * MM_PER_UM) * self.error_um
 
     def with_errors(self, state: AppState) -> "SceneOverlay[T]":
@@ -151,7 +150,6 @@ def chosen_test(state: AppState) -> type[BenchTest] | None:
 
 
 def plan_test(test: BenchTest, scene: Scene) -> BenchPlan:
-    """Plan a test on a machine."""
     plan = test.plan(scene)
     if len(plan.point_mm) > MOST_SITES:
         raise OptionError(

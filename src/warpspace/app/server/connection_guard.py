@@ -81,7 +81,6 @@ class Guard:
             logger.warning("refused %s: %s (further ones are not logged)", client, text)
 
     def options(self, viser_options: dict[str, Any]) -> dict[str, Any]:
-        """Return the options of the `websockets` server, from those of viser."""
 
         def process_request(connection: ServerConnection, request: Request) -> Any:
             refusal = self._check(connection, request)
@@ -143,7 +142,6 @@ class TabConnection(ServerConnection):
             take(events)
 
     async def recv(self, decode: bool | None = None) -> Any:
-        """Receive the next message for viser."""
         while True:
             try:
                 raw = await super().recv(decode)

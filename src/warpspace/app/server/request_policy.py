@@ -51,7 +51,6 @@ class HostPort:
     port: int | None
 
     def usual(self, scheme: str) -> "HostPort":
-        """Return the place without a port that is the default of the scheme."""
         return HostPort(self.host, None if self.port == _DEFAULT_PORTS[scheme] else self.port)
 
 

@@ -68,7 +68,6 @@ class Display:
         layers: Sequence[BoxLayer | MovingLayer] = (),
         panels: Sequence[Panel] = (),
     ) -> None:
-        """Add new layers and panels, and render the panels."""
         self.layers = (*self.layers, *layers)
         self.panels |= {panel.name: panel for panel in panels}
         classes = (Refresh.IMMEDIATE, Refresh.THROTTLED)
@@ -200,7 +199,6 @@ class Session:
 
     @property
     def _tabs(self) -> Iterable[Context]:
-        """All tabs that show the state."""
         return [self.context] if self._review_tabs is None else self._review_tabs()
 
     def start(self) -> None:

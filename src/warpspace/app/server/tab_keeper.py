@@ -76,7 +76,6 @@ class TabMemory:
         self.forget()
 
     def forget(self) -> None:
-        """Delete records above the limits, the oldest first."""
         now = self._clock()
         size = sum(left.store.size_bytes for _, left in self._records.values())
         while self._records:
@@ -112,19 +111,14 @@ class PageCopy(msgspec.Struct, omit_defaults=True):
     missing: tuple[str, ...] = ()  # omitted parts, as texts
 
 
-def page_copy_text(
-    state: AppState, camera: CameraMemory | None, known_scenes: Sequence[Scene]
-) -> str:
+def page_copy_text(state: AppState, camera: CameraMemory | None, scenes: Sequence[Scene]) -> str:
     """Write the copy of a state that its page stores."""
     bare = without_table(state)
     missing = () if bare is state else (NO_TABLE,)
     single = replace(bare, comparison=Comparison())
     for candidate in (bare,) if single == bare else (bare, single):
         with suppress(OptionError):
-            file, link = (
-                state_to_toml(candidate, camera),
-                named_link(candidate, camera, known_scenes),
-            )
+            file, link = state_to_toml(candidate, camera), named_link(candidate, camera, scenes)
             left_out = missing if candidate is bare else (*missing, COMPARISON)
             short = link if link and len(link) <= MAX_LINK else ""
             copy = PageCopy(file, candidate.scene.name, short, left_out)
@@ -135,7 +129,7 @@ def page_copy_text(
 
 
 def read_page_copy(
-    text: str, known_scenes: Sequence[Scene]
+    text: str, scenes: Sequence[Scene]
 ) -> tuple[AppState, CameraMemory | None, tuple[str, ...]]:
     """Build state and camera from the copy in a page; also list the parts that are missing."""
     try:
@@ -144,7 +138,7 @@ def read_page_copy(
         raise OptionError("the copy in this tab is damaged") from None
     missing = (*NEVER_RESTORED, *copy.missing)
     with suppress(WarpspaceError):
-        state, camera = open_link(copy.link, known_scenes)
+        state, camera = open_link(copy.link, scenes)
         if state_to_toml(state, camera) == copy.file:
             return state, camera, missing
     state, camera = open_text(copy.file, safe_name(copy.name, "kept"), "the copy in this tab")

@@ -64,7 +64,6 @@ def is_everywhere(address: str) -> bool:
 
 
 def served_names(host: str, address: str) -> frozenset[str]:
-    """List the host names and addresses under which the app is served."""
     names = {host.lower(), plain_address(address)}
     if is_local(address):
         return frozenset(names | LOOPBACK_NAMES)
@@ -299,15 +298,12 @@ class Viewer:
         scenes = SceneList(self._scenes)
         context = Context(self.server, client, store, scenes, self._services)
         context.notes += self._notes
-        review_tabs = self._review_tabs if self._shared else None
-        session = Session(context, self._live, self.claim, review_tabs=review_tabs)
+        tabs = (lambda: [tab.context for tab in self.sessions]) if self._shared else None
+        session = Session(context, self._live, self.claim, review_tabs=tabs)
         with self._lock:
             self._sessions[client.client_id] = session
         connection.listen(context.take)
         session.start()
-
-    def _review_tabs(self) -> list[Context]:
-        return [session.context for session in self.sessions]
 
     def claim(self, session: Session, token: str) -> TabRecord | None:
         if not is_token(token):

@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpspace.app.state.leaf import Span, described, error_names, leaf_metadata
+from warpspace.app.state.leaf import Span, described, error_names, describe
 from warpspace.app.state.look import (
     Look,
     MachineLook,
@@ -89,7 +89,7 @@ class Exclusions:
     excluded: frozenset[str] = described(
         frozenset[str](),
         "Excluded errors",
-        entry_label="Exclusion of {}",
+        item_label="Exclusion of {}",
         choices=error_names,
         linked="excluded",
     )
@@ -97,7 +97,7 @@ class Exclusions:
     only: frozenset[str] = described(
         frozenset[str](),
         "Errors drawn alone",
-        entry_label="Only {}",
+        item_label="Only {}",
         choices=error_names,
         linked="only",
     )
@@ -138,7 +138,7 @@ class Specification:
     fixed: frozenset[str] = described(
         frozenset[str](),
         "Fixed tolerances",
-        entry_label="Fixed tolerance of {}",
+        item_label="Fixed tolerance of {}",
         choices=error_names,
     )
     costs: str = described(
@@ -175,7 +175,7 @@ class PartLook:
     """The workpiece in the box, in place of the scene's own."""
 
     # mesh and text of the program are never stored in files or links
-    mesh: PartMesh | None = field(default=None, metadata=leaf_metadata("Mesh of the part"))
+    mesh: PartMesh | None = field(default=None, metadata=describe("Mesh of the part"))
     name: str = described("", "Part", linked="part")
     place: tuple[float, ...] | None = described(
         None,
@@ -186,8 +186,8 @@ class PartLook:
         hint="Fixture position of the part in the workpiece frame: x, y, z in mm, and rotations in"
         " degrees about the fixed x, y and z, in that order; empty for the default.",
     )
-    program: str | None = field(default=None, metadata=leaf_metadata("Program"))
-    program_name: str = field(default="", metadata=leaf_metadata("Program"))
+    program: str | None = field(default=None, metadata=describe("Program"))
+    program_name: str = field(default="", metadata=describe("Program"))
     shown: bool = described(
         True,
         "Part in the box",
@@ -218,7 +218,6 @@ class PartLook:
 
     @property
     def is_empty(self) -> bool:
-        """True where neither part nor program is drawn."""
         return (self.mesh is None or not self.shown) and self.program is None
 
 
@@ -271,7 +270,6 @@ class Comparison:
     pinned: Side | None = None  # pinned last: the state before, or a proposal
 
     def off(self) -> "Comparison":
-        """Return a comparison without sides; the pinned state stays."""
         return Comparison(pinned=self.pinned, ghost=self.ghost)
 
 
@@ -280,10 +278,10 @@ class AppState:
     """Everything that a picture depends on."""
 
     # machine, curves of the errors, working volume
-    scene: Scene = field(metadata=leaf_metadata("Scene"))
+    scene: Scene = field(metadata=describe("Scene"))
     # µm or µrad; amplitude of every parameter of the scene
     amplitudes: Mapping[str, float] = field(
-        metadata=leaf_metadata(
+        metadata=describe(
             "Errors",
             kind="number",
             each=lambda state: dict.fromkeys(state.amplitudes, AMPLITUDE),
@@ -292,10 +290,10 @@ class AppState:
     )
     # degrees; of the rotary axes
     positions: Mapping[str, float] = field(
-        metadata=leaf_metadata(
+        metadata=describe(
             "Rotary positions",
             kind="number",
-            entry_label="Position of {}",
+            item_label="Position of {}",
             each=lambda state: state.position_spans,
             linked="{key}",
             hint="Position while the working volume is evaluated.",
@@ -333,34 +331,32 @@ class AppState:
     # of sampled machines: the scene's, unless changed
     tolerances: ToleranceSet = field(
         default_factory=ToleranceSet,
-        metadata=leaf_metadata(
+        metadata=describe(
             "Tolerances",
             kind="number",
-            entry_label="Tolerance of {}",
+            item_label="Tolerance of {}",
             each=lambda state: dict.fromkeys(state.amplitudes),
             linked="",
         ),
     )
     specification: Specification = field(default_factory=Specification)
     # the scene as opened, where `scene` has been edited since
-    loaded: Scene | None = field(default=None, metadata=leaf_metadata("Scene"))
+    loaded: Scene | None = field(default=None, metadata=describe("Scene"))
     # title of the scene whose errors were dropped with its machine; empty for none, and after the
     # next change of scene
-    left_behind: str = field(default="", metadata=leaf_metadata("Scene"))
+    left_behind: str = field(default="", metadata=describe("Scene"))
     look: Look = field(default_factory=Look)
     machine: MachineLook = field(default_factory=MachineLook)
     rotary: RotaryLook = field(default_factory=RotaryLook)
     part: PartLook = field(default_factory=PartLook)
     # the picked point, and the error with axis and lever drawn
-    picked: Picked | None = field(default=None, metadata=leaf_metadata("Point"))
+    picked: Picked | None = field(default=None, metadata=describe("Point"))
     lever: str = described("", "Lever", choices=lambda state: {"": "none", **error_names(state)})
-    comparison: Comparison = field(default_factory=Comparison, metadata=leaf_metadata("Comparison"))
+    comparison: Comparison = field(default_factory=Comparison, metadata=describe("Comparison"))
     # with the applied compensation table; never stored in files or links
-    controller: "Controller | None" = field(
-        default=None, metadata=leaf_metadata("Compensation table")
-    )
+    controller: "Controller | None" = field(default=None, metadata=describe("Compensation table"))
     # notes of reviewers; not in the scene, which is a key of caches
-    review: tuple[Note, ...] = field(default=(), metadata=leaf_metadata("Notes"))
+    review: tuple[Note, ...] = field(default=(), metadata=describe("Notes"))
     # open sections of the page, and texts of its forms (`form_values.py`); undo changes neither
     page: PageLook = field(default_factory=PageLook, compare=False)
     forms: Mapping[str, str] = field(default_factory=dict[str, str], compare=False)
@@ -414,7 +410,6 @@ class AppState:
         return function.with_amplitude(self.amplitudes[key])
 
     def resulting_scene(self) -> Scene:
-        """Build the scene of the state, which is saved and exported."""
         scene, limit = self.scene, self.specification.limit_um
         keys = [k for k, at in self.amplitudes.items() if at or k in scene.errors.functions]
         scene_positions = scene.workspace.positions
@@ -453,7 +448,6 @@ class AppState:
         return replace(self, notes=()) if self.notes else self
 
     def with_amplitude(self, key: str, value: float) -> "AppState":
-        """Set a computed amplitude, µm or µrad."""
         return replace(self, amplitudes={**self.amplitudes, key: value})
 
     def with_scene(self, scene: Scene) -> "AppState":
@@ -490,7 +484,6 @@ class AppState:
         return replace(self, scene=same, loaded=None if same is self.origin else self.origin)
 
     def reset(self) -> "AppState":
-        """Reset all errors to the values and curves of the scene as opened."""
         changed = replace(self.scene, errors=ErrorSet(self.own_curves))
         return replace(self.with_edited(changed), amplitudes=self.start)
 

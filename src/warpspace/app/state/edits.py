@@ -68,7 +68,6 @@ def with_scene_tolerances(state: AppState) -> AppState:
 
 
 def with_scaled_tolerances(state: AppState, keys: Collection[str], factor: float) -> AppState:
-    """Scale tolerances by a factor, except fixed ones."""
     present = {key: half_width_of(state, key) for key in keys}
     scaled = {
         key: min(half_width * factor, max(MAX_HALF_WIDTH, half_width))

@@ -22,7 +22,6 @@ _OPTION = re.compile(r"[a-z_]{1,40}")
 
 
 def linked_forms(state: AppState) -> list[tuple[str, str]]:
-    """List the form texts that are stored in links and files."""
     return [(name, text) for name, text in state.forms.items() if _is_known(name)]
 
 
@@ -44,7 +43,6 @@ def _is_known(name: str) -> bool:
 
 
 def option_values(state: AppState, name: str) -> dict[str, str]:
-    """Return the texts of the options of an analysis, by option."""
     prefix = f"{name}."
     return {k.removeprefix(prefix): v for k, v in state.forms.items() if k.startswith(prefix)}
 

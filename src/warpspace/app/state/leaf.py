@@ -69,13 +69,13 @@ class Leaf:
     unit: str = ""
     hint: str = ""
     linked: str = ""  # name in links and files; empty where it is not stored
-    entry_label: str = "{}"  # of an entry or a member; ``{}`` is its name
+    item_label: str = "{}"  # of an entry or a member; ``{}`` is its name
     # for choices, or entries with ranges, that depend on the state
     choose: Callable[[Any], Choices] | None = None
     each: Callable[[Any], Mapping[str, Span | None]] | None = None
 
 
-def leaf_metadata(
+def describe(
     label: str, *, choices: Choices | Callable[[Any], Choices] | None = None, **attributes: Any
 ) -> dict[str, Leaf]:
     """Build the metadata of a field; `linked` may contain ``{path}`` and ``{key}``."""
@@ -97,7 +97,7 @@ def described(default: T, label: str, **attributes: Any) -> T:
     else:
         kind = "text" if isinstance(default, str) else "number"
     attributes = {"kind": kind, **attributes}
-    return field(default_factory=lambda: default, metadata=leaf_metadata(label, **attributes))
+    return field(default_factory=lambda: default, metadata=describe(label, **attributes))
 
 
 def description(entry: "Field[Any]") -> Leaf | None:

@@ -70,7 +70,7 @@ class Look:
     slices_mm: Mapping[str, float] = described(
         dict[str, float](),
         "Slices",
-        entry_label="Slice across {}",
+        item_label="Slice across {}",
         each=lambda state: slice_spans(state.scene),
     )
     follow: bool = described(
@@ -101,7 +101,7 @@ class MachineLook:
     linear_mm: Mapping[str, float] = described(
         dict[str, float](),
         "Positions of the machine",
-        entry_label="Machine {}",
+        item_label="Machine {}",
         each=lambda state: linear_spans(state.scene),
         hint="Position of the axis; moves the bodies and the tool point.",
     )
@@ -134,7 +134,7 @@ class RotaryLook:
         dict[str, tuple[float, ...]](),
         "Positions of held rotary axes",
         kind="numbers",
-        entry_label="{} held at",
+        item_label="{} held at",
         each=lambda state: state.position_spans,
         hint="Positions while the other rotary axis rotates, separated by commas; empty for a few"
         " around the present one.",
@@ -143,7 +143,6 @@ class RotaryLook:
     chosen: str = described("", "Trace")
 
     def points_mm(self, scene: Scene) -> tuple[Vector, ...]:
-        """List the traced points, mm in the workpiece frame."""
         points = [p for n, p in enumerate(scene.trace_points_mm) if str(n) not in self.off]
         return (*points, *(() if self.own_mm is None else (self.own_mm,)))
 
@@ -167,7 +166,6 @@ def linear_spans(scene: Scene) -> dict[str, Span]:
 
 
 def _spans(scene: Scene, *, within: bool) -> dict[str, Span]:
-    """Return the travels of axes, extended where the workspace exceeds them."""
     spans: dict[str, Span] = {}
     for name, axis in scene.machine.axes.items():
         if (axis.is_linear or name in scene.workspace.volume_axes) is within:

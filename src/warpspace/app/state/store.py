@@ -69,7 +69,7 @@ def _leaf_changes(old: AppState, new: AppState, group: str) -> Iterator[tuple[st
         if isinstance(before, frozenset) and isinstance(after, frozenset):
             for name in sorted(before ^ after):
                 sign = "+" if name in after else "-"
-                yield f"{path}.{sign}{name}", lowered(leaf.entry_label.format(name_of(name)))
+                yield f"{path}.{sign}{name}", lowered(leaf.item_label.format(name_of(name)))
         elif not _equal(before, after):
             yield path, lowered(leaf.label)
 
@@ -213,12 +213,10 @@ class StateStore:
 
     @property
     def is_edited(self) -> bool:
-        """True once any tab has changed the state."""
         return self._document.is_edited
 
     @property
     def size_bytes(self) -> int:
-        """Memory held by the history."""
         return sum(step.size_bytes for step in (*self.past, *self.future))
 
     @property
@@ -304,7 +302,6 @@ class StateStore:
         return True
 
     def copy(self) -> "StateStore":
-        """Return an independent store with the same state and history."""
         store = StateStore(self.state)
         store.past, store.future = [*self.past], [*self.future]
         return store

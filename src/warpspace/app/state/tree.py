@@ -62,7 +62,7 @@ def _described(state: AppState, entry: "Field[Any]", prefix: str = "") -> Iterat
     else:
         for key, span in leaf.each(state).items():
             at = f"{path}.{key}"
-            label, unit = leaf.entry_label.format(name_of(key)), _unit(state, key)
+            label, unit = leaf.item_label.format(name_of(key)), _unit(state, key)
             linked = leaf.linked.format(path=at, key=key)
             yield replace(leaf, path=at, label=label, span=span, unit=unit, linked=linked)
 
