@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpspace.app.state.leaf import Span, described, error_names, describe
+from warpspace.app.state.leaf import Span, describe, described, error_names
 from warpspace.app.state.look import (
     Look,
     MachineLook,
