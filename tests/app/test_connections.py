@@ -106,13 +106,13 @@ def test_what_is_kept_is_bounded_in_time_and_number():
     tokens = [new_token() for _ in range(MAX_CLOSED_TABS + 10)]
     for token in tokens:
         memory.keep(token, TabRecord(StateStore(STATE), None))
-    assert len(memory._records) == MAX_CLOSED_TABS
+    assert len(memory) == MAX_CLOSED_TABS
     assert memory.take(tokens[0]) is None
     assert memory.take(tokens[-2]) is not None
     assert memory.take(tokens[-2]) is None  # given back once
     now[0] = RETENTION_S + 1.0
     assert memory.take(tokens[-1]) is None
-    assert len(memory._records) == 0
+    assert len(memory) == 0
 
 
 def test_what_is_kept_is_bounded_in_memory_and_released_once_it_is_too_old():

@@ -316,7 +316,7 @@ class Viewer:
             if not twins:
                 session.token = token
         if twins:
-            # a duplicated tab, or one whose former connection is not closed yet
+            # a duplicated tab, or one whose previous connection is not closed yet
             twin = twins[0].context.store
             record = TabRecord(twin.joined() if self._shared else twin.copy(), None)
             session.rename(new_token())

@@ -266,19 +266,19 @@ class StateStore:
         Where another tab has changed the same value since, the step is dropped with an
         `OptionError`.
         """
-        return self._travel(self.past, self.future, back=True)
+        return self._travel(self.past, self.future, is_undo=True)
 
     def redo(self) -> str:
         """Apply the change that was undone last; return its label; raises as `undo`."""
-        return self._travel(self.future, self.past, back=False)
+        return self._travel(self.future, self.past, is_undo=False)
 
-    def _travel(self, source: list[UndoStep], target: list[UndoStep], *, back: bool) -> str:
+    def _travel(self, source: list[UndoStep], target: list[UndoStep], *, is_undo: bool) -> str:
         with self._document.lock:
             self._changed_at = float("-inf")
             if not source:
                 return ""
             step = source.pop()
-            sides = (step.after, step.before) if back else (step.before, step.after)
+            sides = (step.after, step.before) if is_undo else (step.before, step.after)
             try:
                 self._document.state = merged(*sides, self.state)
             except OptionError as error:
