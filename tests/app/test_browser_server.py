@@ -171,7 +171,7 @@ def test_killed_server_is_said_and_its_tab_restored(browser, tmp_path):
         wait_for(page, changed)
         said = page.inner_text(BOX)
         assert "This tab is restored" in said
-        assert "Not restored: what Undo and Redo could go back to;" in said
+        assert "Not restored: the history of Undo and Redo;" in said
         assert page.get_attribute("[data-box='errors:set.EAX']", "data-text") == "-80"
         page.get_by_role("button", name="Close", exact=True).click()
         assert page.locator(BOX).count() == 0
