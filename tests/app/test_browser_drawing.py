@@ -89,6 +89,6 @@ def test_the_table_turns_until_the_page_is_left(open_tab):
     tab.until(lambda: tab.drawn("/rotation/actual") is None)
     turn.click()
     tab.until(lambda: stage.playing)
-    worker = tab.session._worker
+    worker = tab.session.worker
     tab.page.goto("about:blank")
     tab.until(lambda: not worker.is_alive())

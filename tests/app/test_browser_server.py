@@ -173,7 +173,7 @@ def test_killed_server_is_said_and_its_tab_restored(browser, tmp_path):
         wait_for(page, changed)
         said = page.inner_text(BOX)
         assert "This tab is restored" in said
-        assert "Not restored: what Undo and Redo could go back to;" in said
+        assert "Not restored: the history of Undo and Redo;" in said
         assert page.get_attribute("[data-box='errors:set.EAX']", "data-text") == "-80"
         page.get_by_role("button", name="Close", exact=True).click()
         assert page.locator(BOX).count() == 0
@@ -194,7 +194,7 @@ def test_interrupted_connection_says_that_all_is_there_and_a_lost_state_that_it_
         tab.until(lambda: tab.state.amplitudes["EXX"] == 7.0)
         # viser connects at once while the page is in front: as if it were not
         page.evaluate("document.hasFocus = () => false")
-        viewer._server._websock_server.disconnect_all_clients()
+        viewer.server._websock_server.disconnect_all_clients()
         page.wait_for_selector(f"{BOX}[role=alert]")
         tab.until(lambda: "as soon as this page is in front" in page.inner_text(BOX))
         page.evaluate(
@@ -208,7 +208,6 @@ def test_interrupted_connection_says_that_all_is_there_and_a_lost_state_that_it_
             tab.until(lambda value=value: tab.state.amplitudes["EXX"] == value)
         # what a page has kept may be anything; the server lets it keep what is shown at each rest
         page.evaluate("warpspacePage.server.keep = () => {}")
-        viewer._memory._left.clear()
         page.evaluate("sessionStorage.setItem('warpspace-tab', 'f'.repeat(32))")
         page.evaluate(
             "text => sessionStorage.setItem('warpspace-kept', JSON.stringify({at: 0, text}))",

@@ -65,7 +65,7 @@ def extent(tab):
 
 def settled(tab):
     """Wait until the camera stands still, and tell where the box is then."""
-    tab.until(lambda: tab.session.context.camera._told is not None)
+    tab.until(lambda: tab.session.context.camera.reported_room is not None)
     return tab.still(lambda: extent(tab), 0.2)
 
 
@@ -110,16 +110,16 @@ def test_nothing_is_covered_and_the_box_fills_its_room_unless_it_was_turned(open
     tab.page.mouse.up()
     tab.until(lambda: not np.allclose(camera.remember().position, filled.position, atol=0.1))
     turned = tab.still(lambda: camera.remember().position)
-    told = camera._told
+    told = camera.reported_room
     tab.page.set_viewport_size({"width": 1280, "height": 720})
-    tab.until(lambda: camera._told != told)
+    tab.until(lambda: camera.reported_room != told)
     settled(tab)
     assert np.allclose(camera.remember().position, turned, atol=1e-3)
 
 
 def bars_agree(tab):
     """Wait until both bars are as long as what they stand for across the line of sight."""
-    across = SO3(tab.session._client.camera.wxyz).as_matrix()[:, 0]
+    across = SO3(tab.session.context.client.camera.wxyz).as_matrix()[:, 0]
     middle = PICTURE.grid.bounds_mm.mean(axis=0)
 
     def pixels(length_mm):
@@ -145,7 +145,7 @@ VIEWS = {"front": (0, -1, 0), "right": (1, 0, 0), "top": (0, 0, 1), "iso": None}
 
 
 def test_every_view_looks_along_its_axis_through_both_lenses_with_right_scale_bars(tab):
-    camera = tab.session._client.camera
+    camera = tab.session.context.client.camera
 
     def away():
         return camera.position - camera.look_at

@@ -21,7 +21,7 @@ from warpspace.app.evaluation.compare import with_pin, without_table, without_wo
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.machine_bodies import tool_point
 from warpspace.app.evaluation.machine_edits import with_changed_scene
-from warpspace.app.evaluation.point_explanation import measured, pick_worst, with_picked
+from warpspace.app.evaluation.point_explanation import measure_distance, pick_worst, with_picked
 from warpspace.app.panels.analysis_panel import AnalysisOutcome
 from warpspace.app.panels.conventions import with_reference
 from warpspace.app.panels.improve import (
@@ -32,7 +32,7 @@ from warpspace.app.panels.improve import (
     packed,
     with_box,
 )
-from warpspace.app.server.tab_keeper import NO_TABLE, kept_text, read_kept
+from warpspace.app.server.tab_keeper import NO_TABLE, page_copy_text, read_page_copy
 from warpspace.app.state.app_state import PartLook, start_state
 from warpspace.app.state.tree import put
 from warpspace.cli.services import draw_compensation
@@ -139,7 +139,9 @@ def test_slices_and_the_tool_point_have_the_table_too(controller):
 
 def test_a_measured_distance_is_that_of_the_points_as_drawn(left):
     ends = {"distance.start": "X=-200,Y=0", "distance.end": "X=200,Y=0"}
-    found, seen, drawn = measured(LIVE.evaluate(replace(left, forms=ends, exaggeration=1.0)))
+    found, seen, drawn = measure_distance(
+        LIVE.evaluate(replace(left, forms=ends, exaggeration=1.0))
+    )
     nominal, actual = (float(np.linalg.norm(at[1] - at[0])) for at in (seen, drawn))
     assert found.distance_mm == pytest.approx((nominal, actual), abs=1e-9)
     assert found.difference_um == pytest.approx(1e3 * (actual - nominal), abs=1e-6)
@@ -178,7 +180,7 @@ def test_whatever_is_shown_says_which_machine_it_is_of(left, controller):
     assert "first-order model" not in page
     assert WITH_TABLE not in build_offline_html(LIVE.evaluate(START))
     for state in (left, both, with_pin(left)):
-        assert "without the table" in without_words(state)
+        assert "without the compensation table" in without_words(state)
         assert "HEIDENHAIN .COM and .CMA (X 9" in exported_words(LIVE.evaluate(state))
         bare = without_table(state)
         assert bare.controller is None
@@ -189,11 +191,11 @@ def test_whatever_is_shown_says_which_machine_it_is_of(left, controller):
 def test_no_file_keeps_the_table_and_a_restored_tab_says_so(controller):
     both = with_box(START, COMPARISON, controller)
     assert state_to_toml(without_table(both), None) == state_to_toml(START, None)
-    restored, _, missing = read_kept(kept_text(both, None, [SCENE]), [SCENE])
+    restored, _, missing = read_page_copy(page_copy_text(both, None, [SCENE]), [SCENE])
     assert restored.controller is None
     assert restored.comparison.b is None
     assert NO_TABLE in missing
-    assert NO_TABLE not in read_kept(kept_text(START, None, [SCENE]), [SCENE])[2]
+    assert NO_TABLE not in read_page_copy(page_copy_text(START, None, [SCENE]), [SCENE])[2]
 
 
 def shown(part, state, found):
@@ -247,12 +249,14 @@ def test_a_point_that_is_asked_about_lies_on_the_drawn_box(left):
     picture = LIVE.evaluate(left)
     asked = with_picked(left, pick_worst(picture))
     assert asked.picked is not None
-    explained = point_explanation.answer(asked, asked.picked, picture.exaggeration)
+    explained = point_explanation.explain_point(asked, asked.picked, picture.exaggeration)
     worst = np.unravel_index(int(np.argmax(picture.field.norm_um)), picture.shape)
     assert np.abs(explained.drawn_um - picture.field.error_um[worst]).max() < 1e-9
     assert np.abs(explained.drawn_mm - picture.drawn_mm[worst]).max() < 1e-6
     # what it is made of are the errors, of which the table is none
-    plain = point_explanation.answer(without_table(asked), asked.picked, picture.exaggeration)
+    plain = point_explanation.explain_point(
+        without_table(asked), asked.picked, picture.exaggeration
+    )
     assert np.array_equal(explained.explanation.error_um, plain.explanation.error_um)
     assert np.linalg.norm(plain.drawn_um) > 2.0 * np.linalg.norm(explained.drawn_um)
     assert explained.is_corrected

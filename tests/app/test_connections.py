@@ -19,9 +19,9 @@ from warpspace.app.browser.incoming import LONGEST_VALUE, Events
 from warpspace.app.panels.panel import MOST_FILES, Context
 from warpspace.app.server import viewer
 from warpspace.app.server.tab_keeper import (
-    KEPT_BYTES,
-    KEPT_SECONDS,
-    KEPT_TABS,
+    MAX_CLOSED_TABS,
+    MAX_HISTORY_BYTES,
+    RETENTION_S,
     TabMemory,
     TabRecord,
     is_token,
@@ -73,7 +73,7 @@ def test_public_tunnel_is_off_and_a_second_app_takes_another_port():
     scene = load_scene("dvf5000_nominal")
     with viewer.Viewer(scene) as first, viewer.Viewer(scene) as second:
         assert first.port != second.port
-        assert first._server.request_share_url() is None
+        assert first.server.request_share_url() is None
 
 
 def test_a_connection_that_is_gone_takes_nothing_from_the_tab_that_comes_back():
@@ -81,9 +81,9 @@ def test_a_connection_that_is_gone_takes_nothing_from_the_tab_that_comes_back():
     token, left = new_token(), TabRecord(StateStore(start_state(scene)), None)
     gone: Any = SimpleNamespace(token="")
     with viewer.Viewer(scene) as running:
-        running._memory.keep(token, left)
-        assert running._claim(gone, token) is None
-        assert running._memory.take(token) is left
+        running.memory.keep(token, left)
+        assert running.claim(gone, token) is None
+        assert running.memory.take(token) is left
 
 
 def test_a_page_says_once_which_tab_it_is():
@@ -103,22 +103,22 @@ STATE = start_state(load_scene("dvf5000_first"))
 def test_what_is_kept_is_bounded_in_time_and_number():
     now = [0.0]
     memory = TabMemory(clock=lambda: now[0])
-    tokens = [new_token() for _ in range(KEPT_TABS + 10)]
+    tokens = [new_token() for _ in range(MAX_CLOSED_TABS + 10)]
     for token in tokens:
         memory.keep(token, TabRecord(StateStore(STATE), None))
-    assert len(memory._left) == KEPT_TABS
+    assert len(memory) == MAX_CLOSED_TABS
     assert memory.take(tokens[0]) is None
     assert memory.take(tokens[-2]) is not None
     assert memory.take(tokens[-2]) is None  # given back once
-    now[0] = KEPT_SECONDS + 1.0
+    now[0] = RETENTION_S + 1.0
     assert memory.take(tokens[-1]) is None
-    assert len(memory._left) == 0
+    assert len(memory) == 0
 
 
 def test_what_is_kept_is_bounded_in_memory_and_released_once_it_is_too_old():
     now, meshes = [0.0], []
     memory = TabMemory(clock=lambda: now[0])
-    for _ in range(KEPT_BYTES // 48_000_000 + 4):
+    for _ in range(MAX_HISTORY_BYTES // 48_000_000 + 4):
         store = StateStore(STATE)
         mesh = Workpiece("x", np.zeros((2_000_000, 3)), np.zeros((1, 3), "i4"))
         look = replace(STATE.part, mesh=mesh)
@@ -127,8 +127,8 @@ def test_what_is_kept_is_bounded_in_memory_and_released_once_it_is_too_old():
         meshes.append(weakref.ref(mesh))
         del store, mesh, look
     gc.collect()
-    assert 1 < sum(mesh() is not None for mesh in meshes) <= KEPT_BYTES // 48_000_000
-    now[0] = KEPT_SECONDS + 1.0
+    assert 1 < sum(mesh() is not None for mesh in meshes) <= MAX_HISTORY_BYTES // 48_000_000
+    now[0] = RETENTION_S + 1.0
     memory.forget()
     gc.collect()
     assert not any(mesh() for mesh in meshes)

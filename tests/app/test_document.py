@@ -44,10 +44,10 @@ from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.panels.conventions import with_choice, with_reference
 from warpspace.app.server.tab_keeper import (
     COMPARISON,
-    NEVER_KEPT,
+    NEVER_RESTORED,
     START_VALUES,
-    kept_text,
-    read_kept,
+    page_copy_text,
+    read_page_copy,
 )
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import Comparison, Side, start_state
@@ -147,7 +147,7 @@ def test_hostile_settings_are_clamped_or_left_out_and_named():
     assert back.amplitudes["EXX"] == MAX_ERROR
     assert back.component == "norm"
     assert abs(back.picked.at["X"]) <= 300.0
-    assert any("left out" in note for note in back.notes)
+    assert any("ignored" in note for note in back.notes)
     assert with_settings(START, "x" * 20_000).without_notes() == START
 
 
@@ -215,35 +215,35 @@ def edited():
     ids=["known scene", "comparison", "edited curve"],
 )
 def test_a_tab_comes_back_whole_with_its_camera(state):
-    found, camera, missing = read_kept(kept_text(state, CAMERA, KNOWN), KNOWN)
+    found, camera, missing = read_page_copy(page_copy_text(state, CAMERA, KNOWN), KNOWN)
     assert found.resulting_scene().errors == state.resulting_scene().errors
     if state.loaded is None:  # so that Reset goes where it went
         assert found == state
     assert camera == CAMERA
-    assert missing[: len(NEVER_KEPT)] == NEVER_KEPT
+    assert missing[: len(NEVER_RESTORED)] == NEVER_RESTORED
 
 
 def test_scene_that_the_server_has_no_more_comes_back_from_its_file():
-    found, _, missing = read_kept(kept_text(edited(), None, KNOWN), KNOWN[1:])
+    found, _, missing = read_page_copy(page_copy_text(edited(), None, KNOWN), KNOWN[1:])
     assert found.resulting_scene().errors == edited().resulting_scene().errors
     assert found.component == "z"
-    assert missing == (*NEVER_KEPT, START_VALUES)
+    assert missing == (*NEVER_RESTORED, START_VALUES)
     # and so does one that has changed under its name
     other = replace(KNOWN[1], name="dvf5000_first")
-    found, *_ = read_kept(kept_text(edited(), None, KNOWN), [other])
+    found, *_ = read_page_copy(page_copy_text(edited(), None, KNOWN), [other])
     assert found.resulting_scene().errors == edited().resulting_scene().errors
 
 
 def test_comparison_that_is_too_large_is_left_out_and_named(monkeypatch):
     state = with_pin(edited()).with_amplitude("EXX", 1.0)
-    alone = kept_text(START.with_amplitude("EXX", 1.0), None, KNOWN)
+    alone = page_copy_text(START.with_amplitude("EXX", 1.0), None, KNOWN)
     monkeypatch.setattr("warpspace.app.server.tab_keeper.MAX_KEPT_TEXT", len(alone) + 300)
-    found, _, missing = read_kept(kept_text(state, None, KNOWN), KNOWN)
+    found, _, missing = read_page_copy(page_copy_text(state, None, KNOWN), KNOWN)
     assert found.comparison.b is None
     assert found.amplitudes["EXX"] == 1.0
     assert COMPARISON in missing
     monkeypatch.setattr("warpspace.app.server.tab_keeper.MAX_KEPT_TEXT", 10)
-    assert kept_text(state, None, KNOWN) == ""
+    assert page_copy_text(state, None, KNOWN) == ""
 
 
 @pytest.mark.parametrize(
@@ -254,7 +254,7 @@ def test_comparison_that_is_too_large_is_left_out_and_named(monkeypatch):
 )  # fmt: skip
 def test_anything_may_come_from_a_page(text):
     with pytest.raises(WarpspaceError):
-        read_kept(text, KNOWN)
+        read_page_copy(text, KNOWN)
 
 
 def test_opened_scenes_are_bounded_and_the_oldest_goes():
@@ -384,7 +384,7 @@ def test_titles_from_a_link_cannot_pose_as_something_else(title):
 def test_a_trace_that_means_nothing_is_left_out_and_named(text):
     back = opened("link", urlencode({"why.trace": text, "why.C": "3"}))
     assert back.picked is None
-    assert any("left out" in note for note in back.notes)
+    assert any("ignored" in note for note in back.notes)
 
 
 @pytest.mark.parametrize("text", ["\n" * 300_000, "#\n" * 200_000, "# warpspace-view: a\n" * 9])

@@ -224,7 +224,7 @@ def test_access_that_cannot_be_given(access, problem):
 
 def test_an_app_that_cannot_be_guarded_does_not_start(monkeypatch):
     monkeypatch.setattr(viewer, "serve_with", lambda _: nullcontext(list[bool]()))
-    with pytest.raises(OptionError, match="cannot be guarded"):
+    with pytest.raises(OptionError, match="in an unknown way"):
         Viewer(SCENE)
 
 

@@ -93,7 +93,7 @@ def test_hostile_events_change_nothing(word):
 def test_what_is_no_number_is_said_and_exclusions_are_counted():
     column = Column()
     column.do("set.EAY", "x7")
-    assert column.state.notes == ("EAY = 'x7'; expected a number, it stays as it was",)
+    assert column.state.notes == ("EAY = 'x7'; expected a number; unchanged",)
     assert column.state.amplitudes == STATE.amplitudes
     column.state = toggled(column.state, "exclusions.only", "EAY")
     assert "6 of 7 errors excluded" in column.do("none")["errors"]

@@ -17,7 +17,7 @@ from offline import EVIL, opened_offline, wait_for_the_map
 from warpspace.app.documents.legend import (
     look_words,
     picture_conditions,
-    seen_words,
+    projected_labels,
     state_conditions,
 )
 from warpspace.app.documents.offline_page import build_offline_html, offline_picture
@@ -154,7 +154,7 @@ def test_volumes_that_differ_export_the_side_that_is_drawn():
     picture = picture_of("difference", with_sides(START, Side(), scene_side(other)))
     assert picture.compared.refused
     assert picture.compared.difference is None
-    assert picture.compared.shown == "b"
+    assert picture.compared.view == "b"
     assert len(shown_sides(picture, sheet=True)) == 1
     assert file_stem(picture) == "B_other"
     assert "sheet" not in exported_words(picture)
@@ -244,9 +244,9 @@ def test_a_picture_of_the_screen_says_what_it_shows_beside_its_pixels():
     pose = fit_camera(picture.drawn_mm.reshape(-1, 3), 1.5, margins=(0.2, 0.2, 0.2, 0.2))
     pixels = np.zeros((400, 600, 4), np.uint8)
     pixels[180:220, 250:350] = (90, 10, 200, 255)
-    words, px_per_mm = seen_words(picture, pose, 400, 600)
+    words, px_per_mm = projected_labels(picture, pose, 400, 600)
     unbarred = replace(picture, state=replace(BOTH, look=replace(BOTH.look, bars=False)))
-    assert seen_words(unbarred, pose, 400, 600)[1] is None
+    assert projected_labels(unbarred, pose, 400, 600)[1] is None
     # a millimetre of the middle of the picture, seen from as far
     assert px_per_mm == pytest.approx(
         200.0 / np.tan(pose.fov_rad / 2.0)

@@ -62,7 +62,7 @@ def test_a_panel_that_fails_whatever_is_shown_does_not_hold_the_state(
         assert session.state.amplitudes["EXX"] == 5.0
 
 
-@pytest.mark.parametrize("name", ["part_in_box", "path_in_box"])
+@pytest.mark.parametrize("name", ["part_overlay", "path_overlay"])
 def test_a_scene_whose_part_cannot_be_evaluated_opens_without_it(
     monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:

@@ -18,7 +18,7 @@ from page_client import CAMERA, App, dial, pack, said, until
 from reliability.outcome import Lag
 from warpspace.app.browser.incoming import MOST_EVENTS, Event, event_of, read_message
 from warpspace.app.browser.page import Page
-from warpspace.app.browser.viser_private import connection_of, send_at_once
+from warpspace.app.browser.viser_private import connection_of, message_buffer, send_at_once
 from warpspace.app.server import session
 from warpspace.app.server.connection_guard import TabConnection
 from warpspace.app.server.session import turn
@@ -30,14 +30,14 @@ from warpspace.scene.library import load_scene
 @pytest.fixture(scope="module")
 def client():
     with Viewer(load_scene("dvf5000_nominal")) as running, dial_viewer(running) as socket:
-        server = running._server
+        server = running.server
         assert Wire(socket).read_until(lambda: bool(server.get_clients()))
         (handle,) = server.get_clients().values()
         yield server, handle
 
 
 def test_its_connections_are_ours_and_send_at_once(client):
-    buffer = client[1]._websock_connection.get_message_buffer()
+    buffer = message_buffer(client[1])
     assert callable(buffer.message_event.set)
     assert buffer.message_from_id is not None
     assert buffer.window_duration_sec == 0.0
@@ -117,7 +117,7 @@ def test_only_what_viser_is_to_know_reaches_it(monkeypatch):
     with opened(load_scene("dvf5000_nominal")) as (wire, session):
         seen.clear()
         for message in (*nonsense(), pack(said(("errors:set.EXX", "7"))), camera(fov=0.5)):
-            wire._socket.send(message)
+            wire.socket.send(message)
         assert wire.read_until(lambda: session.state.amplitudes["EXX"] == 7.0)
         assert wire.read_until(lambda: bool(seen))
     assert seen == [camera(fov=0.5)]
@@ -125,7 +125,7 @@ def test_only_what_viser_is_to_know_reaches_it(monkeypatch):
 
 def test_events_that_no_page_sends_are_refused_in_words_and_the_page_goes_on(caplog):
     with opened(load_scene("dvf5000_first"), services=build_services()) as (wire, session):
-        sent = events(sorted(session.display.parts))
+        sent = events(sorted(session.display.panels))
         for at in range(0, len(sent), MOST_EVENTS):
             wire.send(said(*sent[at : at + MOST_EVENTS]))
             time.sleep(0.01)  # no faster than a page may
@@ -138,9 +138,9 @@ def test_events_that_no_page_sends_are_refused_in_words_and_the_page_goes_on(cap
     assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []
 
 
-def test_texts_stay_texts_within_a_script():
-    page, sent, evil = object.__new__(Page), list[str](), 'x"</script><script>alert(1)//\u2028'
-    page._sent, page.run_script = {}, sent.append
+def test_texts_stay_texts_within_a_script(client, monkeypatch):
+    page, sent, evil = Page(*client), list[str](), 'x"</script><script>alert(1)//\u2028'
+    monkeypatch.setattr(page, "run_script", sent.append)
     page.notify(evil, evil)
     page.call("title", evil)
     page.put({"head": evil})

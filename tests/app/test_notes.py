@@ -13,7 +13,7 @@ from warpspace.app.documents.scene_file import open_link, open_text, state_to_li
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.drawing.labels import note_labels
 from warpspace.app.evaluation.machine_bodies import drawn_bodies
-from warpspace.app.evaluation.point_explanation import answer, drawn_places
+from warpspace.app.evaluation.point_explanation import drawn_places, explain_point
 from warpspace.app.panels.note_panels import NotesPanel
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import Picked, start_state
@@ -122,7 +122,7 @@ def test_a_note_on_a_trace_or_a_body_is_pinned_where_that_is_drawn():
     traced = pin(part)
     assert traced.on == NoteAnchor("workpiece", point.point_mm)
     assert (traced.at["B"], {*traced.at}) == (20.0, {*START.scene.machine.axes})
-    found = answer(START, point, 1.0)
+    found = explain_point(START, point, 1.0)
     assert traced.numbers["here_um"] == pytest.approx(np.linalg.norm(found.drawn_um), abs=0.02)
     assert part.do("show." + replace(traced, view="").id).picked.point_mm == point.point_mm
     part.store.apply(lambda state: put(state, "page.note_place", "Z"))
@@ -134,7 +134,9 @@ def test_a_note_on_a_trace_or_a_body_is_pinned_where_that_is_drawn():
     drawn = LIVE.evaluate(put(state, "machine.shown", "1"))
     shown, middle = note_labels(drawn)
     np.testing.assert_allclose(flag.at_mm, shown.at_mm)
-    np.testing.assert_allclose(shown.at_mm, answer(state, point, drawn.exaggeration).drawn_mm)
+    np.testing.assert_allclose(
+        shown.at_mm, explain_point(state, point, drawn.exaggeration).drawn_mm
+    )
     points = np.concatenate([b.vertices_mm for b in drawn_bodies(drawn) if b.body.frame == "Z"])
     assert (middle.text, (points.min(axis=0) < middle.at_mm).all()) == ("⚑ 2", True)
     assert (middle.at_mm < points.max(axis=0)).all()
@@ -148,7 +150,7 @@ def test_flags_stand_where_the_points_asked_about_are_drawn(name):
         points = [{a: 0.3 * one.travel[0] for a, one in spans.items()}, dict.fromkeys(spans, 1.0)]
         shown = replace(state, loop=loop)
         found = drawn_places(shown, points, 100.0)
-        wanted = [answer(shown, Picked(at), 100.0).drawn_mm for at in points]
+        wanted = [explain_point(shown, Picked(at), 100.0).drawn_mm for at in points]
         # the box is drawn to first order, a point asked about exactly
         np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-3)
 

@@ -8,7 +8,7 @@ import pytest
 
 import warpspace
 from app.parts import LIVE, lone_part
-from warpspace.app.documents.legend import kept_words, legend_html, marks
+from warpspace.app.documents.legend import legend_html, marks, within_limit_words
 from warpspace.app.drawing.colours import colour_levels
 from warpspace.app.drawing.labels import axes, point_labels
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
@@ -48,7 +48,7 @@ def test_the_heading_says_what_machines_within_tolerance_reach():
 
 @pytest.mark.parametrize(("limit", "kept"), [(51.0, False), (52.0, True), (1.0, False)])
 def test_the_limit_is_kept_only_where_the_largest_error_keeps_it(limit, kept):
-    words, found = kept_words(LIVE.evaluate(limited(limit)))
+    words, found = within_limit_words(LIVE.evaluate(limited(limit)))
     assert found is kept
     assert words.startswith("all of") is kept
     assert "100" not in words

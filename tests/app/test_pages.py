@@ -86,14 +86,14 @@ def test_pages_that_open_at_once_get_all_of_it(viewer, monkeypatch, caplog):
 
 
 def test_a_page_that_leaves_while_it_is_built_ends_its_session(viewer, monkeypatch):
-    reached, left, build = threading.Event(), threading.Event(), Session._draw_around
+    reached, left, build = threading.Event(), threading.Event(), Session.draw_surroundings
 
     def build_late(own, picture):
         reached.set()
         assert left.wait(20.0)
         return build(own, picture)
 
-    monkeypatch.setattr(Session, "_draw_around", build_late)
+    monkeypatch.setattr(Session, "draw_surroundings", build_late)
     monkeypatch.setattr(session, "ANSWER_S", 0.0)
     with dial(viewer) as socket:
         Wire(socket)
@@ -102,8 +102,8 @@ def test_a_page_that_leaves_while_it_is_built_ends_its_session(viewer, monkeypat
     while viewer.sessions:
         time.sleep(0.01)
     left.set()
-    own._worker.join(20.0)
-    assert not own._worker.is_alive()
+    own.worker.join(20.0)
+    assert not own.worker.is_alive()
 
 
 def test_what_comes_just_as_a_wait_ends_is_not_lost():
@@ -125,12 +125,12 @@ def test_what_fails_because_a_page_has_just_gone_is_no_error(viewer, monkeypatch
     with dial(viewer) as socket:
         Wire(socket).read_until(lambda: bool(viewer.sessions))
         (own,) = viewer.sessions
-        own._guarded(fail)
+        own.run_guarded(fail)
         assert "Cannot assign" in caplog.text
         caplog.clear()
-    while viewer._server.get_clients():
+    while viewer.server.get_clients():
         time.sleep(0.01)
-    own._guarded(fail)
+    own.run_guarded(fail)
     told.set()
     assert not caplog.records
 
@@ -231,9 +231,13 @@ def test_one_piece_of_work_waits_for_another_and_may_be_given_up():
     def give_up():
         raise CancelledError
 
-    with cache.taken_turn(lambda: None), pytest.raises(CancelledError), cache.taken_turn(give_up):
+    with (
+        cache.exclusive_work(lambda: None),
+        pytest.raises(CancelledError),
+        cache.exclusive_work(give_up),
+    ):
         raise AssertionError
-    with cache.taken_turn(give_up):  # free again
+    with cache.exclusive_work(give_up):  # free again
         pass
 
 

@@ -15,7 +15,7 @@ from warpspace.app.documents.legend import GEOMETRY_ONLY, part_html
 from warpspace.app.documents.scene_file import open_link, open_text, state_to_link, state_to_toml
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.point_explanation import pick_line
-from warpspace.app.evaluation.scene_overlays import moved_place, part_in_box
+from warpspace.app.evaluation.scene_overlays import moved_place, part_overlay
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
@@ -77,17 +77,17 @@ def test_the_change_of_a_part_is_b_less_a() -> None:
 
 
 def test_turns_keep_the_middle_and_add_up() -> None:
-    placed = part_in_box(STATE)
+    placed = part_overlay(STATE)
     assert placed is not None
     for turn in 90.0 * np.eye(3):
         state = STATE
         for _ in range(4):
-            again = part_in_box(state)
+            again = part_overlay(state)
             assert again is not None
             np.testing.assert_allclose(again.of.middle_mm, placed.of.middle_mm, atol=5e-3)
             place = moved_place(again.of, transforms.placed(again.of.middle_mm, turn))
             state = replace(state, part=replace(state.part, place=place))
-        again = part_in_box(state)
+        again = part_overlay(state)
         assert again is not None
         np.testing.assert_allclose(again.of.vertices_mm, placed.of.vertices_mm, atol=5e-3)
 

@@ -31,25 +31,25 @@ FIRST = start_state(load_scene("dvf5000_first"))
     [
         ("amplitudes.EAX", " 12,5 µrad", "12.5", ""),
         ("amplitudes.EAX", "120", "120.0", ""),  # the range of the slider grows
-        ("amplitudes.EAX", "abc", "5.5", "EAX = 'abc'; expected a number, it stays as it was"),
+        ("amplitudes.EAX", "abc", "5.5", "EAX = 'abc'; expected a number; unchanged"),
         ("amplitudes.EXX", "−1e9", repr(-MAX_ERROR), "EXX = -1e+09 is outside"),
         ("positions.B", "500°", "30.0", "B = 500 is outside -120 to 30 °; clamped to 30 °"),
         ("amplitudes.EXX", "nan", "0.0", "EXX = 'nan'; expected a number"),
         ("exaggeration", "×250", "250.0", ""),
         ("exaggeration", "auto", "auto", ""),
         ("nodes", "12", "13", ""),
-        ("component", "w", "norm", "component = 'w'; expected one of norm, x, y, z, it stays"),
-        ("shown.ghost", "maybe", "1", "nominal box = 'maybe'; expected 0 or 1, it stays"),
-        ("exclusions.excluded", "EXX,EYX,?", "EXX,EYX", "excluded errors: ? left out"),
+        ("component", "w", "norm", "component = 'w'; expected one of norm, x, y, z; unch"),
+        ("shown.ghost", "maybe", "1", "nominal box = 'maybe'; expected 0 or 1; unch"),
+        ("exclusions.excluded", "EXX,EYX,?", "EXX,EYX", "excluded errors: ? ignored"),
         ("rotary.own_mm", "10; 20,5; -3e3", "10.0,20.5,-2000.0", "clamped to -2000 mm"),
-        ("rotary.held.B", "-30 0 90", "-30.0,0.0", "B held at: 90 left out"),
+        ("rotary.held.B", "-30 0 90", "-30.0,0.0", "B held at: 90 ignored"),
         ("rotary.held.B", "−30, 0; 30° 0", "-30.0,0.0,30.0", ""),
-        ("rotary.held.B", "10, abc nan inf", "10.0", "left out"),
+        ("rotary.held.B", "10, abc nan inf", "10.0", "ignored"),
         (
             "rotary.held.B",
             "0 1 2 3 4 5 6 7 8",
             "0.0,1.0,2.0,3.0,4.0,5.0,6.0,7.0",
-            "the first 8 are taken",
+            "only the first 8 are used",
         ),
         ("tolerances.EAX", "3", "3.0", ""),
         ("tolerances.EAX", "-1", "0.0", "tolerance of roll of X = -1 is outside 0 to 1000 µrad"),
@@ -104,7 +104,7 @@ def test_what_follows_a_leaf_follows_it_and_members_come_and_go():
         (edits.with_curve(FIRST, "EAX", Constant((-275.0, 275.0), 3.0)), "roll of X"),
         (FIRST.with_scene(load_scene("teach_tilted_c")), "scene"),
         (with_word(FIRST, "travel X 0 -200"), "machine"),
-        (replace(with_pin(FIRST), controller=object()), "table of compensation"),
+        (replace(with_pin(FIRST), controller=object()), "compensation table"),
         (with_pin(FIRST), "comparison"),
     ],
 )
@@ -217,14 +217,14 @@ def test_a_drag_is_one_step_and_a_pause_or_another_slider_begins_another():
     pushed(store, "EAX", 2.0, 2.0)
     pushed(store, "EAX", 3.0, 2.1 + SAME_STEP_S)
     pushed(store, "EBX", 1.0, 2.1 + SAME_STEP_S)
-    assert [step.words for step in store.past] == [*["roll of X"] * 3, "pitch of X"]
+    assert [step.label for step in store.past] == [*["roll of X"] * 3, "pitch of X"]
 
 
 def test_a_change_after_undo_forgets_the_future_and_none_is_no_step():
     store = StateStore(FIRST)
     store.apply(replace, at=1.0)
     assert store.state is FIRST
-    assert (store.past, store.undo(), store.redo()) == ((), "", "")
+    assert (store.past, store.undo(), store.redo()) == ([], "", "")
     pushed(store, "EAX", 1.0, 1.0)
     store.undo()
     assert store.redoes == "roll of X"

@@ -76,7 +76,7 @@ def test_a_step_that_cannot_be_drawn_keeps_its_words_and_says_why():
     state = told()
     lost = replace(state.review[0], view="compare.b=scene%3Dgone")
     page = build_story_html(replace(state, review=(lost, *state.review[1:]), nodes=3))
-    assert "The drawing of the step before stays" in page
+    assert "The drawing of the previous step is shown" in page
     assert f"Look here. {STEPS - 1}" in page
 
 

@@ -102,7 +102,7 @@ def test_a_link_that_notes_make_too_large_leaves_them_out_and_says_so():
 def test_files_that_a_page_refuses_or_invents_are_said_or_left():
     window = Alone(FilesDialog, STATE)
     window.do("file", f"²\n{HOSTILE}\n")
-    assert "has not arrived whole" in window.said[-1][1]
+    assert "was not received completely" in window.said[-1][1]
     window.do("file", f"{10**9}\n{HOSTILE}\n")
     assert "expected a scene file of at most" in window.said[-1][1]
     window.do("export", "../../etc/passwd")

@@ -14,7 +14,7 @@ from warpspace.app.documents.legend import (
     numbers_words,
     subject_words,
 )
-from warpspace.app.drawing.around import around
+from warpspace.app.drawing.around import draw_surroundings
 from warpspace.app.drawing.box import box
 from warpspace.app.drawing.labels import point_labels
 from warpspace.app.drawing.shapes import SCENE_PER_MM, ellipsoid
@@ -105,7 +105,7 @@ def test_what_is_not_stated_is_unknown_and_what_a_scene_says_nothing_of_is_not_s
     unknown = LIVE.evaluate(moved.with_amplitude("EYY", 1.0))
     assert "max 13.5 ± ? µm" in numbers_words(unknown)
     assert (unknown.quantity, unknown.faded) == ("position", None)
-    assert "/uncertainty/ellipsoid0" not in around(unknown)
+    assert "/uncertainty/ellipsoid0" not in draw_surroundings(unknown)
     silent = LIVE.evaluate(state_of(SCENE.partition("[uncertainty")[0], look__significant="1"))
     assert "±" not in numbers_words(silent)
     assert silent.faded is None
@@ -122,7 +122,7 @@ def test_colours_fade_where_the_error_is_within_its_uncertainty():
     assert faded_words(faded) == (f"grey: |E| ≤ U95, {percent} % of the volume",)
     assert faded_words(faded)[0] in legend_html(faded)
     assert faded_words(plain) == ()
-    assert box(faded)["/box/surface"].follows != box(plain)["/box/surface"].follows
+    assert box(faded)["/box/surface"].assigned != box(plain)["/box/surface"].assigned
     # slices fade by their own numbers
     cut = LIVE.evaluate(put(faded.state, "look.surface", "slices"))
     assert all(one.faded is not None and one.faded.shape == one.shape for one in cut.slices)
@@ -137,7 +137,7 @@ def test_pass_or_fail_fades_where_it_cannot_be_told():
     assert picture.faded[away < 1.5].all()
     assert not picture.faded[away > 1.8].any()
     percent = round(100.0 * (picture.grid.weights * picture.faded).sum())
-    said = f"grey: pass or fail undecided (95 %), {percent} % of the volume"
+    said = f"grey: undecided at 95 %, {percent} % of the volume"
     assert faded_words(picture) == (said,)
     assert LIVE.evaluate(put(state, "look.pass_fail", "0")).faded is None
 
@@ -145,7 +145,7 @@ def test_pass_or_fail_fades_where_it_cannot_be_told():
 def drawn_mm(shape, ways):
     """Give where directions of a ball, [n, 3], are once it is scaled, turned and moved, mm."""
     ball = ways / np.linalg.norm(ways, axis=-1, keepdims=True)
-    told = shape.follows
+    told = shape.assigned
     points = SO3(told["wxyz"]).apply(ball * told["scale"]) + told["position"]
     return points / SCENE_PER_MM
 
@@ -157,7 +157,7 @@ def test_ellipsoids_reach_along_each_direction_as_far_as_u95():
     np.testing.assert_allclose(np.einsum("ni,ij,nj->n", points, np.linalg.inv(square), points), 1.0)
     picked = replace(state_of(look__ellipsoids="1"), picked=Picked({"X": 0.0, "Y": 0.0, "Z": 0.0}))
     picture = LIVE.evaluate(picked)
-    shapes = [one for name, one in around(picture).items() if "ellipsoid" in name]
+    shapes = [one for name, one in draw_surroundings(picture).items() if "ellipsoid" in name]
     assert len(shapes) == 9
     one = drawn_mm(shapes[0], way)
     assert np.ptp(one, axis=0)[0] == pytest.approx(2 * 4.0e-3 * picture.exaggeration, rel=1e-2)
@@ -166,7 +166,7 @@ def test_ellipsoids_reach_along_each_direction_as_far_as_u95():
 def test_what_was_never_measured_is_said_and_dotted():
     picture = LIVE.evaluate(state_of())
     assert "outside the measured range: Z below −50" in subject_words(picture)
-    dotted = around(picture)["/uncertainty/unmeasured"].follows["points"]
+    dotted = draw_surroundings(picture)["/uncertainty/unmeasured"].assigned["points"]
     assert len(dotted) == 25  # the nodes at Z −100; those at −50 were reached
     off = LIVE.evaluate(state_of(look__unmeasured="0"))
-    assert "/uncertainty/unmeasured" not in around(off)
+    assert "/uncertainty/unmeasured" not in draw_surroundings(off)

@@ -10,11 +10,11 @@ from app.parts import LIVE, Alone, lone_part, wait
 from warpspace.analysis.commands.distance import Distance
 from warpspace.analysis.description import ignore_progress
 from warpspace.analysis.registry import entries
-from warpspace.app.drawing.around import around
+from warpspace.app.drawing.around import draw_surroundings
 from warpspace.app.drawing.labels import point_labels
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.point_explanation import (
-    answer,
+    explain_point,
     pick,
     pick_worst,
     with_clicked,
@@ -87,7 +87,7 @@ def test_a_node_is_asked_about_where_it_is_drawn(name):
             axis: float(np.broadcast_to(v, grid.shape)[node])
             for axis, v in grid.coordinates.items()
         }
-        found = answer(picture.state, Picked(at), picture.exaggeration)
+        found = explain_point(picture.state, Picked(at), picture.exaggeration)
         shown = found.explanation.nominal_mm + found.shift_mm
         assert shown == pytest.approx(grid.nominal_mm[node], abs=1e-9)
 
@@ -155,7 +155,7 @@ def test_a_typed_point_is_clamped_to_the_travel_and_said():
 @pytest.mark.parametrize("at", [AT, "X=0,Y=0,Z=-280,B=-30,C=45", "X=-275,Y=225,Z=-80"])
 def test_a_typed_point_has_the_error_of_the_exact_chain(at):
     state = put(START, "picked", at)
-    shown = answer(state, state.picked, 1.0)
+    shown = explain_point(state, state.picked, 1.0)
     wanted = evaluate(FIRST, at=read_positions(at), exact=True)
     np.testing.assert_allclose(shown.explanation.error_um, wanted.error_um, atol=1e-9)
     np.testing.assert_allclose(shown.explanation.nominal_mm, wanted.nominal_mm, atol=1e-9)
@@ -308,14 +308,14 @@ def test_a_measured_distance_is_drawn_between_the_displaced_points_with_its_six_
     assert words == found.lines()
     assert words[0].startswith("400.000 → ")
     assert words[1].count("Δ") == 3
-    shapes = around(picture)
-    drawn = [answer(state, Picked(at), picture.exaggeration).drawn_mm for at in found.at]
-    ends = shapes["/measured/actual"].follows["points"]
+    shapes = draw_surroundings(picture)
+    drawn = [explain_point(state, Picked(at), picture.exaggeration).drawn_mm for at in found.at]
+    ends = shapes["/measured/actual"].assigned["points"]
     np.testing.assert_allclose(ends[0], drawn[:2], atol=1e-3)
-    assert len(ends) == len(shapes["/measured/nominal"].follows["points"]) == 3
+    assert len(ends) == len(shapes["/measured/nominal"].assigned["points"]) == 3
 
 
 @pytest.mark.parametrize("text", ["", "Q=1", "X=200,Y=0", "X=1e99", "<b>"])
 def test_points_that_measure_nothing_draw_nothing(text):
     state = measuring(start=text, end="X=200,Y=0").store.state
-    assert "/measured/actual" not in around(LIVE.evaluate(state))
+    assert "/measured/actual" not in draw_surroundings(LIVE.evaluate(state))

@@ -65,7 +65,7 @@ def test_a_file_that_is_parsed_when_its_tab_closes_is_not_taken_in(held) -> None
         event, value = upload("good.stl", STL)
         wire.say(event.replace("files:", "part:"), value)
         assert wire.read_until(lambda: bool(begun))
-        (job,) = session.context.jobs
+        (job,) = [job for job in session.context.jobs if job.name == "Reading"]
         session.stop()
         assert job.is_set()
         go_on.set()

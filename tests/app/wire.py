@@ -24,13 +24,13 @@ class Wire(Page):
 
     def __init__(self, socket: ClientConnection, tab: str = "") -> None:
         super().__init__()
-        self._socket = socket
+        self.socket = socket
         self.kinds: list[str] = []
         self.say("tab:here", tab or secrets.token_hex(16))
         self.send(CAMERA)
 
     def send(self, message: dict[str, Any]) -> None:
-        self._socket.send(pack(message))
+        self.socket.send(pack(message))
 
     def say(self, name: str, value: object = "") -> None:
         self.send(said((name, value)))
@@ -40,7 +40,7 @@ class Wire(Page):
         heard = time.monotonic()
         while not fine():
             try:
-                raw = self._socket.recv(timeout=0.1)
+                raw = self.socket.recv(timeout=0.1)
             except TimeoutError:  # what is waited for may come without a message
                 if time.monotonic() - heard > seconds:
                     return fine()
@@ -62,8 +62,9 @@ def end_work(viewer: Viewer) -> None:
     for session in sessions:
         session.stop()
     for session in sessions:
-        session._worker._started.wait(60.0)  # a page may have come just now
-        session._worker.join(60.0)
+        while session.worker.ident is None:  # a page may have come just now
+            time.sleep(0.01)
+        session.worker.join(60.0)
 
 
 @contextmanager

@@ -10,7 +10,6 @@ from collections import Counter
 from contextlib import contextmanager
 
 import pytest
-from warpspace.thesis import rows
 
 from warpspace.analysis.blocks import Column, number_columns
 from warpspace.cli import tables as module

@@ -62,4 +62,4 @@ def test_without_a_token_the_command_says_what_it_means():
         assert status(link) == 200
         said = process.stderr.readline()
         assert "WARNING" in said
-        assert "whoever reaches it" in said
+        assert "anyone who reaches it" in said

@@ -95,7 +95,7 @@ def test_a_packed_scene_and_a_comparison_are_restored_and_what_cannot_be_read_is
     assert {one.range_top for _, name, _, one in unread if name == "error-map"} == {own.range_top}
     assert "the scene as it is now" in unread[0][0]
     for said, *_ in unread[1:]:
-        assert "settings left out" in said or "clamped to 100000" in said
+        assert "ignored settings" in said or "clamped to 100000" in said
 
 
 @pytest.mark.render

@@ -13,8 +13,13 @@ import glb
 from app.parts import lone_part
 from random_scenes import scenes
 from warpspace import to_pyvista
-from warpspace.app.documents.legend import kept_words, legend_html, numbers_words, subject_words
-from warpspace.app.drawing.around import around, words
+from warpspace.app.documents.legend import (
+    legend_html,
+    numbers_words,
+    subject_words,
+    within_limit_words,
+)
+from warpspace.app.drawing.around import draw_labels, draw_surroundings
 from warpspace.app.drawing.box import box, ghost_dashes
 from warpspace.app.drawing.camera import VIEWS, fit_camera
 from warpspace.app.drawing.labels import axes_room_mm
@@ -81,7 +86,12 @@ def states(draw):
 def test_every_state_has_a_finite_picture(server, state):
     picture = LiveModel().evaluate(state)
     _check_finite(picture)
-    shapes = {**box(picture), **around(picture), **words(picture), **machine(picture, {})}
+    shapes = {
+        **box(picture),
+        **draw_surroundings(picture),
+        **draw_labels(picture),
+        **machine(picture, {}),
+    }
     Nodes(server.scene).draw(shapes)
     for view in VIEWS.values():
         place = fit_camera(axes_room_mm(picture), 1.6, view)
@@ -119,7 +129,7 @@ def test_every_panel_has_words_for_it(state):
     asked = replace(picture, state=with_picked(state, Picked(at)))
     said = [
         legend_html(picture),
-        " ".join((numbers_words(picture), kept_words(picture)[0], *subject_words(picture))),
+        " ".join((numbers_words(picture), within_limit_words(picture)[0], *subject_words(picture))),
         lone_part(RotarySection).body(picture),
         lone_part(ConventionsSection).body(picture),
         *WorstPanel(None).render(asked).values(),

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from warpspace.app.documents.scene_file import (
-    kept_views,
+    file_notes,
     named_link,
     open_text,
     settings_line,
@@ -90,7 +90,7 @@ def survives(scene, sent):
     assert linked.notes == opened.notes == ()
     assert opened.tolerances == state.tolerances
     # a link by name has none: with notes the whole file is packed, or it is said that they are out
-    assert (linked.review, opened.review) == ((), kept_views(state))
+    assert (linked.review, opened.review) == ((), file_notes(state))
     assert not state.review or not named_link(state, None, None)
     for path, leaf in leaves(state).items():
         found = value(state, path)

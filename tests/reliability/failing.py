@@ -30,11 +30,11 @@ BAD = 13.25
 """Value of EXX that makes a state fail."""
 STAGES: dict[str, tuple[object, str]] = {
     "field": (LiveModel, "evaluate"),
-    "part": (live_picture, "part_in_box"),
-    "program": (live_picture, "path_in_box"),
+    "part": (live_picture, "part_overlay"),
+    "program": (live_picture, "path_overlay"),
     "map": (BoxLayer, "show"),
     "around the map": (MovingLayer, "show"),
-    "at rest": (BoxLayer, "rest"),
+    "at rest": (BoxLayer, "synchronise"),
     "heading": (HeadPanel, "render"),
     "legend": (LegendPanel, "render"),
     "conditions": (OrderPanel, "render"),

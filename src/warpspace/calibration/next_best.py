@@ -333,9 +333,9 @@ def _u95_of_part(
     gains = point_basis(replace(scene, errors=parameters.errors), points, parameters.keys).position
     features, count = scene.part.path("features"), len(points.point_mm)
     if target == "part":
-        gains = subtract_best_fit(points.point_mm, gains).reshape(len(parameters.keys), -1) / np.sqrt(
-            count
-        )
+        gains = subtract_best_fit(points.point_mm, gains).reshape(
+            len(parameters.keys), -1
+        ) / np.sqrt(count)
         return lambda covariance: FACTOR * float(np.sqrt(np.sum(gains * (covariance @ gains))))
     if features is not None:
         tolerances = features, read_text(Path(features), MAX_SCENE_BYTES)

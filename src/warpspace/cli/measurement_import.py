@@ -183,7 +183,10 @@ def _write_template(
                 f"--over {second_axis!r}; expected another axis than {name}, such as Z=0,100"
             )
         second_positions = _positions(values_text if equals else None, "--over")
-        at = (places or csv_own.default_positions(name), second_positions or csv_own.default_positions(other))
+        at = (
+            places or csv_own.default_positions(name),
+            second_positions or csv_own.default_positions(other),
+        )
         if len(at[0]) * len(at[1]) > MAX_ROWS:
             raise OptionError(
                 f"{len(at[0])} × {len(at[1])} points; expected at most {MAX_ROWS:,} rows"

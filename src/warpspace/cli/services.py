@@ -20,11 +20,10 @@ from warpspace.app.documents.legend import (
     numbers_words,
     picture_conditions,
     range_conditions,
-    seen_words,
     state_conditions,
 )
 from warpspace.app.documents.output_services import CancelledError, Services
-from warpspace.app.documents.scene_file import kept_views, reopened
+from warpspace.app.documents.scene_file import reopened
 from warpspace.app.documents.transfers import shown_sides
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.live_model import LiveModel
@@ -124,7 +123,7 @@ def draw_view(
 
     statistics = picture.statistics
     numbers = {"mean": statistics.mean_um, "P95": statistics.p95_um, "max": statistics.max_um}
-    caption, px_per_mm = seen_words(picture, camera, *pixels.shape[:2])
+    caption, px_per_mm = projected_labels(picture, camera, *pixels.shape[:2])
     arguments = (
         pixels, picture.title, look_words(picture), picture.scale, marked(picture),
         [(f"{n} {picture.length_words}", f"{spell(v)} µm") for n, v in numbers.items()],
@@ -222,7 +221,7 @@ def write_report(
         spec_um=state.specification.limit_um, author=author, questions=tuple(questions),
     )  # fmt: skip
     same_loop = [one for one in sides if one.loop == sides[0].loop]
-    scenes = [replace(one.active_scene(), review=kept_views(one)) for one in same_loop]
+    scenes = [replace(one.active_scene(), review=file_notes(one)) for one in same_loop]
     with _renderer_slot(cancelled), temporary_folder() as folder:
         target = folder / f"report{ending}"
         review = write_review(

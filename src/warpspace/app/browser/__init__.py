@@ -1,1 +1,1 @@
-"""What viser's public interface does not offer: scripts, the page's style, private parts."""
+"""Scripts and style of the page, its HTML and messages, and the private parts of viser."""

@@ -1,7 +1,7 @@
-"""Pieces of HTML that a page consists of: buttons, number boxes, sliders, choices, sections.
+"""HTML elements of the page: buttons, text boxes, sliders, choices, sections.
 
-Every text is escaped here; only what is `Markup` already goes in as it is. What an element sends is
-an event, ``part:word`` with a value, see `events.py`.
+Every text that is not `Markup` is escaped here. An element sends an event, ``panel:action`` with a
+value, see `incoming.py`.
 """
 
 import re
@@ -17,14 +17,14 @@ EMPTY = Markup("")
 
 
 def text(value: object) -> str:
-    """Escape what is no `Markup`; that of `markupsafe` itself takes three to ten times as long."""
+    """Escape a text that is not `Markup`; `markupsafe.escape` takes three to ten times as long."""
     return value if isinstance(value, Markup) else escape(str(value))
 
 
 def fill(template: str, /, *values: object, **named: object) -> Markup:
-    """Fill in a template; every value that is no `Markup` is escaped."""
-    said = {name: text(value) for name, value in named.items()}
-    return Markup(template.format(*map(text, values), **said))  # noqa: S704
+    """Format a template; values that are not `Markup` are escaped."""
+    escaped = {name: text(value) for name, value in named.items()}
+    return Markup(template.format(*map(text, values), **escaped))  # noqa: S704
 
 
 def join(parts: Iterable[object]) -> Markup:
@@ -32,13 +32,13 @@ def join(parts: Iterable[object]) -> Markup:
 
 
 def attributes(**values: object) -> Markup:
-    """Spell attributes; None and False leave one out, True needs no value, ``_`` becomes ``-``."""
-    found = "".join(
+    """Format attributes; None and False omit one, True gives no value, ``_`` becomes ``-``."""
+    markup = "".join(
         f" {_spelt(name)}" if value is True else f' {_spelt(name)}="{text(value)}"'
         for name, value in values.items()
         if value is not None and value is not False
     )
-    return Markup(found)  # noqa: S704 - escaped here
+    return Markup(markup)  # noqa: S704 - escaped here
 
 
 @lru_cache(maxsize=256)
@@ -51,7 +51,7 @@ def tag(name: str, body: object = "", **values: object) -> Markup:
 
 
 def button(
-    words: object,
+    label: object,
     do: str,
     value: object = None,
     *,
@@ -59,28 +59,28 @@ def button(
     hint: str = "",
     pressed: bool | None = None,
     disabled: bool = False,
-    **more: object,
+    **extra: object,
 ) -> Markup:
-    """Give a button that sends an event; `kind` is "", "main", "quiet" or "link"."""
+    """Render a button that sends an event; `kind` is "", "main", "quiet" or "link"."""
     state = None if pressed is None else str(pressed).lower()
     return tag(
-        "button", words, type="button", class_=f"ws-button {kind}".strip(), data_do=do,
-        data_value=value, title=hint or None, aria_pressed=state, disabled=disabled, **more,
+        "button", label, type="button", class_=f"ws-button {kind}".strip(), data_do=do,
+        data_value=value, title=hint or None, aria_pressed=state, disabled=disabled, **extra,
     )  # fmt: skip
 
 
 def upload_button(
-    words: str, part: str, most_bytes: int, endings: str, *, hint: str, kind: str = ""
+    label: str, part: str, most_bytes: int, endings: str, *, hint: str, kind: str = ""
 ) -> Markup:
-    """Give a button that opens a chooser of files, which come as events ``part:file``."""
+    """Render a button that opens a file chooser; the files arrive as events ``panel:file``."""
     return tag(
-        "button", words, type="button", class_=f"ws-button {kind}".strip(), data_upload=part,
+        "button", label, type="button", class_=f"ws-button {kind}".strip(), data_upload=part,
         data_most=most_bytes, data_accept=endings, title=hint,
     )  # fmt: skip
 
 
 def number(value: float, digits: int = 1) -> str:
-    """Spell a number for people: a true minus, no minus before a zero."""
+    """Format a number with a typographic minus; zero has no sign."""
     text = f"{value:.{digits}f}"
     if float(text) == 0.0:
         text = text.lstrip("-")
@@ -88,38 +88,37 @@ def number(value: float, digits: int = 1) -> str:
 
 
 def signed(value: float, digits: int = 1) -> str:
-    """Spell a number with its sign; zero has none."""
+    """Format a number with its sign; zero has no sign."""
     text = number(value, digits)
     return text if text.startswith(MINUS) or not float(text.replace(MINUS, "-")) else f"+{text}"
 
 
 def lowered(text: str) -> Markup:
-    """Set the letter behind an underscore lower: |E_B − E_A|."""
+    """Render the letter after an underscore as a subscript: |E_B − E_A|."""
     return Markup(re.sub("_(.)", r"<sub>\1</sub>", str(escape(text))))  # noqa: S704 - escaped before
 
 
 _LINK = re.compile(r"(https?://[^\s<>\"']+[^\s<>\"'.,;:!?)\]])")
 
 
-def linked(words: str) -> Markup:
-    """Give what somebody has written, with links made of addresses of http and https alone."""
-    parts = _LINK.split(words)
+def linked(source: str) -> Markup:
+    """Render the text of a user; http and https addresses become links."""
+    parts = _LINK.split(source)
     return join(
         tag("a", part, href=part, target="_blank", rel="noopener noreferrer") if i % 2 else part
         for i, part in enumerate(parts)
     )
 
 
-# --- What can be set ------------------------------------------------------------------------------
+# --- Controls -------------------------------------------------------------------------------------
 
 
 def ident(name: str) -> str:
-    """Give an element's id for an event's name."""
+    """Return the id of the element that sends an event."""
     return "ws-" + re.sub(r"[^0-9A-Za-z]+", "-", name)
 
 
 def field(label: object, control: Markup, name: str, unit: str = "", hint: str = "") -> Markup:
-    """Give a labelled control; its unit stands behind it."""
     return fill(
         '<div class="ws-field"{title}><label for="{id}">{label}</label>{control}{unit}</div>',
         title=attributes(title=hint or None), id=ident(name), label=label, control=control,
@@ -132,18 +131,18 @@ def _input(**values: object) -> Markup:
 
 
 def text_box(name: str, value: str, *, placeholder: str = "", live: bool = False,
-             label: str = "", size: str = "", **more: object) -> Markup:  # fmt: skip
-    """Give a box that sends what was typed on Enter or when it is left; `live` with each letter."""
+             label: str = "", size: str = "", **extra: object) -> Markup:  # fmt: skip
+    """Render a text box that sends its text on Enter or on blur; with `live` on each key."""
     return _input(
-        type="text", id=more.pop("id", ident(name)), class_=f"ws-box {size}".strip(), value=value,
+        type="text", id=extra.pop("id", ident(name)), class_=f"ws-box {size}".strip(), value=value,
         data_set=name, data_live=name if live else None, placeholder=placeholder or None,
-        aria_label=label or None, autocomplete="off", spellcheck="false", **more,
+        aria_label=label or None, autocomplete="off", spellcheck="false", **extra,
     )  # fmt: skip
 
 
 def slider(name: str, value: float | str, low: float, high: float, step: float, *,
            label: str = "", twin: str = "", text: str = "") -> Markup:  # fmt: skip
-    """Give a slider; `twin` is the name of the number box that digits typed on it go into."""
+    """Render a slider; `twin` is the number box that receives digits typed on the slider."""
     return _input(
         type="range", id=None if not label else ident(name) + "-slider", class_="ws-slider",
         min=f"{low:g}", max=f"{high:g}", step=f"{step:g}",
@@ -153,9 +152,9 @@ def slider(name: str, value: float | str, low: float, high: float, step: float, 
     )  # fmt: skip
 
 
-def choice(name: str, value: str, words: Mapping[str, str], *, label: str = "") -> Markup:
+def choice(name: str, value: str, labels: Mapping[str, str], *, label: str = "") -> Markup:
     options = join(
-        tag("option", said, value=key, selected=key == value) for key, said in words.items()
+        tag("option", said, value=key, selected=key == value) for key, said in labels.items()
     )
     return tag(
         "select", options, id=ident(name), class_="ws-box", data_set=name, aria_label=label or None
@@ -170,7 +169,7 @@ def switch(name: str, label: object, *, on: bool, hint: str = "") -> Markup:
 def fold(
     key: str, heading: object, body: object, *, opens: str, open_: bool, hint: str = ""
 ) -> Markup:
-    """Give a section with a heading that unfolds it; folded, its body is not even there."""
+    """Render a section with a heading that unfolds it; a folded one has no body."""
     head = fill(
         '<summary class="ws-fold" data-do="{opens}" data-value="{key}"{hint}>'
         "<h3>{heading}</h3></summary>",
@@ -180,18 +179,17 @@ def fold(
     return tag("details", head + inner, data_key=key, class_="ws-section", open=open_)
 
 
-def menu(words: object, body: object, *, key: str, kind: str = "", hint: str = "",
+def menu(heading: object, body: object, *, key: str, kind: str = "", hint: str = "",
          label: str = "") -> Markup:  # fmt: skip
-    """Give a menu that opens over what is around it; `kind` "up" opens it upwards."""
+    """Render a menu that opens over the page; `kind` "up" opens it upwards."""
     return fill(
         '<details class="ws-pop {kind}" data-key="menu-{key}"{title}><summary{label}>{words}'
         '</summary><div class="ws-sheet">{body}</div></details>',
-        kind=kind, key=key, title=attributes(title=hint or None), words=words, body=body,
+        kind=kind, key=key, title=attributes(title=hint or None), words=heading, body=body,
         label=attributes(aria_label=label or None),
     )  # fmt: skip
 
 
 def rows(pairs: Iterable[tuple[object, object]], kind: str = "ws-rows") -> Markup:
-    """Give a table of words and what belongs to them, numbers at the right."""
     body = join(fill("<tr><th>{head}</th><td>{value}</td></tr>", head=h, value=v) for h, v in pairs)
     return tag("table", body, class_=kind)

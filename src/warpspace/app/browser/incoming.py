@@ -1,12 +1,11 @@
-"""What a page may say: each message of a connection is read here before anybody acts on it.
+"""Messages that a page may send: each is validated here before it is handled.
 
-What the page's own scripts say (`page.js`) goes to the session as events, ``part:word`` with a
-value; a file is the value of ``part:file``: its size, its name, and what is in it in base64. viser
-is given what its part of the page says of camera, clicks and rendered pictures.
-viser would build an object of whatever kind a message names and set whatever attribute it names;
-here only these kinds pass, with fields of the right type and size. What is refused is left out and
-the connection stays open, since a new one would cost the server more than a message that is
-dropped.
+Events of the page's own scripts (`page.js`), ``panel:action`` with a value, go to the session; a
+file is the value of ``panel:file``: its size, its name, its content in base64. Messages on camera,
+clicks and rendered pictures go to viser.
+viser would build an object of any type that a message names and set any attribute; here only these
+types pass, with fields of the right type and size. Invalid messages are ignored and the connection
+stays open, since a new one would cost the server more than an ignored message.
 """
 
 import logging
@@ -22,7 +21,7 @@ LARGEST_NUMBER = 1e9
 LARGEST_SIDE_PX = 16_384  # of the page's picture, and of a picture that it renders
 PNG_START = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
 MOST_EVENTS = 16
-LONGEST_VALUE = 20_000  # of an event, but for those that may be as long as a file in base64
+LONGEST_VALUE = 20_000  # of an event, except those that hold a file in base64
 LONG = (":file", ":kept")
 LONGEST_INDEX = 8  # digits
 
@@ -39,13 +38,13 @@ class _BrowserMessage(Struct, tag_field="type", forbid_unknown_fields=True):
 
 
 class Events(_BrowserMessage, tag="WarpspaceEvents"):
-    """What a user has done, in order."""
+    """Actions of the user, in order."""
 
     events: Annotated[list[tuple[EventName, EventValue]], Meta(max_length=MOST_EVENTS)]
 
 
 class CameraMoved(_BrowserMessage, tag="ViewerCameraMessage"):
-    """The page's camera; the first one opens the session."""
+    """Camera of the page; the first message opens the session."""
 
     wxyz: tuple[Number, Number, Number, Number]
     position: Vector
@@ -67,25 +66,25 @@ class DrawingClicked(_BrowserMessage, tag="ScenePointerMessage"):
 
 
 class PartHeld(_BrowserMessage, tag="TransformControlsDragStartMessage", kw_only=True):
-    """What moves the part, as it is seized."""
+    """Start of a drag of the gizmo that moves the workpiece."""
 
     name: Annotated[str, Meta(pattern="^/part/gizmo$")]
     owner: Name = ""
 
 
 class PartLetGo(PartHeld, tag="TransformControlsDragEndMessage"):
-    """The same, as it is let go."""
+    """End of the drag."""
 
 
 class PartMoved(PartHeld, tag="TransformControlsUpdateMessage", kw_only=True):
-    """The same, while it is dragged."""
+    """Position of the gizmo during the drag."""
 
     wxyz: tuple[Number, Number, Number, Number]
     position: Vector
 
 
 class PictureRendered(_BrowserMessage, tag="GetRenderResponseMessage"):
-    """The picture that the app has asked for, a PNG."""
+    """Picture that the app requested, a PNG."""
 
     payload: bytes
     render_uuid: Name
@@ -96,13 +95,13 @@ _READER = msgspec.msgpack.Decoder(Message)
 
 
 def read_message(raw: object) -> Message | None:
-    """Read a message of a page; None where the app has no use for it."""
+    """Parse a message of a page; None where it is invalid."""
     try:
         message = _READER.decode(raw) if isinstance(raw, bytes) else None
     except ValueError:  # not msgpack, another kind, other fields, other types, not finite
         message = None
     if message is None or not _is_fine(message):
-        logger.warning("a page has sent a message that the app has no use for; it is left out")
+        logger.warning("ignored an invalid message of a page")
         return None
     return message
 
@@ -121,10 +120,10 @@ def _is_picture(payload: bytes) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something a user did; all of it comes from a browser and may be anything."""
+    """An action of the user; any field may hold any text, since it comes from a browser."""
 
-    part: str  # name of the part of the page
-    word: str  # what is to be done, or the path of what is set behind ``set.``
+    part: str  # name of the panel
+    word: str  # action, or ``set.`` and the path of a setting
     value: str
 
 
@@ -134,6 +133,6 @@ def event_of(name: str, value: str) -> Event:
 
 
 def index_of(value: str, count: int) -> int | None:
-    """Read which of so many things an event means; None where it is none of them."""
-    known = value.isdecimal() and len(value) < LONGEST_INDEX and int(value) < count
-    return int(value) if known else None
+    """Parse an index below `count`; None where the text is none."""
+    is_valid = value.isdecimal() and len(value) < LONGEST_INDEX and int(value) < count
+    return int(value) if is_valid else None

@@ -1,4 +1,4 @@
-"""What a page is sent beside its drawing: scripts of our own, pieces of HTML, messages."""
+"""Scripts, HTML and messages that are sent to a page beside its drawing."""
 
 import json
 import threading
@@ -26,41 +26,40 @@ class Page:
         send_at_once(client)
 
     @contextmanager
-    def as_one(self) -> Generator[None]:
-        """Send what is drawn and written meanwhile in one go; for the session."""
+    def batch(self) -> Generator[None]:
+        """Send everything drawn and written in the context as one message. For the session."""
         with self._client.atomic():
             self._held = []
             try:
                 yield
             finally:
                 with self._lock:
-                    held, self._held = self._held, None
-                if held:
-                    send_script(self._client, "\n".join(held))
+                    scripts, self._held = self._held, None
+                if scripts:
+                    send_script(self._client, "\n".join(scripts))
 
     def put(self, pieces: Mapping[str, str]) -> None:
-        """Write pieces of HTML by the name of their place; what stands there is not sent again."""
+        """Write HTML by the name of its place; unchanged HTML is not sent again."""
         changed = {name: text for name, text in pieces.items() if self._sent.get(name) != text}
         if changed:
             self._sent |= changed
             self.call("show", changed)
 
     def forget(self, place: str) -> None:
-        """Write a place again next time, whatever stands there."""
+        """Send a place again next time, even if unchanged."""
         self._sent.pop(place, None)
 
     def call(self, name: str, *values: object) -> None:
-        """Call a function of the page: of `warpspacePage`, or ``overlay.NAME`` of the drawing."""
         home = f"warpspacePage.{name}".replace("warpspacePage.overlay.", "warpspaceOverlay.")
         self.run_script(f"{home}({', '.join(map(_spelt, values))});")
 
     @property
     def is_open(self) -> bool:
-        """Whether the page is connected; it ends before its session is stopped."""
+        """True while the page is connected; it closes before its session is stopped."""
         return self._client.client_id in self._server.get_clients()
 
     def run_script(self, source: str) -> None:
-        """Run JavaScript of our own in the page; no word of a user's may be in it unescaped."""
+        """Run JavaScript in the page; texts of users in it must be escaped."""
         with self._lock:
             if self._held is None:
                 send_script(self._client, source)
@@ -81,7 +80,7 @@ def script_source(name: str) -> str:
 
 
 def _spelt(value: object) -> str:
-    """Spell a value as JavaScript; a text of a user's can end neither it nor the script."""
+    """Format a value as JavaScript; a text in it can end neither the literal nor the script."""
     return json.dumps(value, separators=(",", ":")).replace("<", "\\u003c")
 
 
@@ -91,5 +90,5 @@ def page_script() -> str:
 
 
 def error_words(error: Exception) -> str:
-    """Say what went wrong; of what nobody foresaw its kind as well."""
+    """Format an exception; an unexpected one with its type."""
     return str(error) if isinstance(error, WarpspaceError) else f"{type(error).__name__}: {error}"

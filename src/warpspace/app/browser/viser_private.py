@@ -1,4 +1,4 @@
-"""Every private part of viser that the app uses: why, and which public thing would replace it.
+"""Private parts of viser that the app uses: why, and the public interface that would replace them.
 
 Nothing else in the app touches a private part of viser. A test names each of them, so that a new
 version of viser that lacks one fails there with a clear message and not somewhere in a page.
@@ -35,7 +35,7 @@ def send_script_to_all(server: ViserServer, source: str) -> None:
 
 
 def connection_of(server: ViserServer, client: ClientHandle) -> ServerConnection | None:
-    """Give the connection of a client; None where it is gone.
+    """Return the connection of a client; None where it is closed.
 
     Our scripts in the page talk to us by it. A public `client.connection` would replace this.
     """
@@ -48,7 +48,7 @@ _STARTING = threading.Lock()
 
 @contextlib.contextmanager
 def serve_with(change: Callable[[dict[str, Any]], dict[str, Any]]) -> Generator[list[bool]]:
-    """Have a server of viser that is created meanwhile started with other options.
+    """Start a viser server created in the context with other options.
 
     viser starts a server of the package `websockets` with options of its own: it checks no request,
     and takes messages of any kind and rate. A parameter of `ViserServer` for these options would
@@ -69,16 +69,20 @@ def serve_with(change: Callable[[dict[str, Any]], dict[str, Any]]) -> Generator[
             library.serve = original
 
 
+def message_buffer(client: ClientHandle) -> Any:
+    connection: Any = client._websock_connection  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
+    return connection.get_message_buffer()
+
+
 def send_at_once(client: ClientHandle) -> None:
-    """Have what is queued for a client sent at once, by the thread that sends.
+    """Send messages to a client at once, in the thread that queues them.
 
     viser collects messages for a sixtieth of a second; ours belong together by `client.atomic`.
     It also sets an event of asyncio from the thread that assigns to a handle. That is not
     allowed, and once in ten thousand assignments it raises "deque mutated during iteration". What
     viser then asks of the event loop is enough. A viser without either would replace this.
     """
-    connection: Any = client._websock_connection  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
-    buffer = connection.get_message_buffer()
+    buffer = message_buffer(client)
     buffer.window_duration_sec = 0.0
     event = buffer.message_event
     original: Callable[[], None] = event.set
@@ -94,9 +98,8 @@ def send_at_once(client: ClientHandle) -> None:
 
 
 def queued(client: ClientHandle) -> int:
-    """Count what waits to be sent to a client, since it reads slowly, or nothing any more.
+    """Count the messages that wait for a client that reads slowly or not at all.
 
     viser keeps all of it. A limit of viser's own would replace this.
     """
-    connection: Any = client._websock_connection  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
-    return len(connection.get_message_buffer().message_from_id)
+    return len(message_buffer(client).message_from_id)

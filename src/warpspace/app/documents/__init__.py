@@ -1,1 +1,1 @@
-"""What is opened, saved, linked and exported."""
+"""Documents of the app: files, links, legends and offline pages."""

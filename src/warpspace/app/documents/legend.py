@@ -1,4 +1,4 @@
-"""What is said of a picture wherever it goes: numbers, place of the max, colour bar, conditions."""
+"""Legend of a picture: statistics, place of the max, colour bar, conditions."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -24,21 +24,21 @@ from warpspace.units import Array, spell_count, spell_short
 # --- The colour bar -------------------------------------------------------------------------------
 
 GEOMETRY_ONLY = "Geometry only: no forces, heat, wear or servo"
-APART = 15.5 / 240.0  # least distance of two names beside the colour bar, as a part of its height
+APART = 15.5 / 240.0  # smallest distance of two labels of the colour bar, relative to its height
 _STOPS = 33
 
 
 class LegendMark(NamedTuple):
-    """What is named beside the colour bar; heights are parts of its own."""
+    """A label of the colour bar; heights are relative to the bar."""
 
-    name: str  # empty at the ends
-    words: str
+    name: str  # empty for the ends
+    text: str
     at: float
-    name_at: float  # away from others
+    name_at: float  # of the label, separated from others
 
 
 def marks(picture: LivePicture) -> list[LegendMark]:
-    """Name ends, limit and statistics of what is coloured, from the lowest up."""
+    """List ends, limit and statistics of the coloured quantity, in ascending order."""
     low, high = picture.scale.low, picture.scale.high
     named = sorted([("", low), ("", high), *marked(picture).items()], key=lambda mark: mark[1])
     values = np.array([value for _, value in named])
@@ -56,13 +56,13 @@ def marks(picture: LivePicture) -> list[LegendMark]:
 
 
 def marked(picture: LivePicture) -> dict[str, float]:
-    """Name what is marked on the colours: statistics of what is coloured, and the limit."""
+    """Return the marked values by name: statistics of the coloured quantity, and the limit."""
     field, values = picture.field, picture.values
     if picture.component != "norm" or picture.quantity == "uncertainty":
-        # the length of the error says nothing of another number: its own ends do
+        # statistics of the length do not apply to components
         mean = volume_mean(values, picture.grid)
         return {"min": float(values.min()), "mean": mean, "max": float(values.max())}
-    if picture.tilts:  # summarised as the length of the position error is
+    if picture.tilts:  # summarised as position errors are
         field = field.tilts
     norm = field.norm_um
     marks = {"mean": volume_mean(norm, picture.grid), "P95": share_within(field, P95),
@@ -73,10 +73,9 @@ def marked(picture: LivePicture) -> dict[str, float]:
 
 
 def legend_html(picture: LivePicture) -> Markup:
-    """Draw the colour bar with unit, ends, limit, mean, P95 and max."""
     scale, named = picture.scale, marks(picture)
     names = join(
-        tag("i", mark.words, style=f"bottom:{100.0 * mark.name_at:.2f}%",
+        tag("i", mark.text, style=f"bottom:{100.0 * mark.name_at:.2f}%",
             class_="ws-mark" if mark.name else "ws-tick", data_mark=mark.name or None)
         for mark in named
     )  # fmt: skip
@@ -92,7 +91,7 @@ def legend_html(picture: LivePicture) -> Markup:
         faded=join(tag("p", lowered(said), class_="ws-tiny") for said in faded_words(picture)),
         label=lowered(scale.label), unit=scale.unit, leads=leads, names=names,
         words=f"Colours from {spell_short(scale.low)} to {spell_short(scale.high)} {scale.unit}: "
-        + ", ".join(mark.words for mark in named if mark.name),
+        + ", ".join(mark.text for mark in named if mark.name),
         colours=_stops(scale),
     )  # fmt: skip
 
@@ -103,50 +102,50 @@ def _stops(scale: ColourScale) -> str:
     if limit is None:
         colours = scale.colours(np.linspace(scale.low, scale.high, _STOPS)).tolist()
         return ",".join(f"rgb({r},{g},{b})" for r, g, b in colours)
-    at = 100.0 * min(limit / scale.high, 1.0)  # two colours that meet there
+    at = 100.0 * min(limit / scale.high, 1.0)  # boundary of two colours
     colours = scale.colours(np.array([0.0, 2.0 * limit])).tolist()
     return ",".join(f"rgb({r},{g},{b}) {at:.1f}%" for r, g, b in colours)
 
 
 def part_html(picture: LivePicture) -> Markup:
-    """Say how far part and program are off where they are drawn, and what that leaves out."""
-    part, look, said = picture.part, picture.state.part, list[Markup]()
+    """Render the largest errors of part and program, with the remark on other effects."""
+    part, look, lines = picture.part, picture.state.part, list[Markup]()
     change = "changes " if picture.is_difference else ""
     named = (f"Part {look.name}", part), (f"Program {look.program_name}", picture.path)
-    for what, found in named:
-        if found is not None:
-            most = number(float(component_values(found.error_um, "norm").max()))
-            out = int(found.outside.sum())
-            more = f", {spell_count(out)} points beyond the travel" if out else ""
-            said.append(join([f"{what} {change}up to {most} µm{more}"]))
+    for subject, overlay in named:
+        if overlay is not None:
+            largest = number(float(component_values(overlay.error_um, "norm").max()))
+            out = int(overlay.outside.sum())
+            beyond = f", {spell_count(out)} points beyond the travel" if out else ""
+            lines.append(join([f"{subject} {change}up to {largest} µm{beyond}"]))
     if part is not None and look.normal:
         scale = picture.coloured(part)[1]
         shades = f"background:linear-gradient(to right,{_stops(scale)})"
         low, high = map(spell_short, (scale.low, scale.high))
         bar = tag("i", "", class_="ws-strip", style=shades)
-        said.append(join((f"Along its normal {low} ", bar, f" {high} µm")))
-    words = Markup("<br>").join((*said, GEOMETRY_ONLY))
-    return tag("p", words, class_="ws-part") if said else EMPTY
+        lines.append(join((f"Along its normal {low} ", bar, f" {high} µm")))
+    body = Markup("<br>").join((*lines, GEOMETRY_ONLY))
+    return tag("p", body, class_="ws-part") if lines else EMPTY
 
 
 # --- The heading ----------------------------------------------------------------------------------
 
 
 def numbers_words(picture: LivePicture) -> str:
-    """Say mean and max: ``mean 30.9 µm · max 51.7 µm``; ± U95 where the scene states it."""
+    """Format mean and max: ``mean 30.9 µm · max 51.7 µm``; with ± U95 where it is known."""
     norm, change = picture.field.norm_um, "change: " if picture.is_difference else ""
     numbers = {"mean": volume_mean(norm, picture.grid), "max": float(norm.max())}
-    found, sure, factor = picture.uncertainty, dict.fromkeys(numbers, ""), ""
-    if found is not None:
-        u95 = found.statistics()
-        sure = {name: formatting.u95_behind(u95[f"{name}_um"]) for name in numbers}
-        factor = f" (k = {found.errors.factor:.3g})"
-    said = (f"{name} {number(value)}{sure[name]} µm" for name, value in numbers.items())
-    return f"{change}{' · '.join(said)}{factor}"
+    uncertainty, u95_texts, factor = picture.uncertainty, dict.fromkeys(numbers, ""), ""
+    if uncertainty is not None:
+        u95 = uncertainty.statistics()
+        u95_texts = {name: formatting.u95_behind(u95[f"{name}_um"]) for name in numbers}
+        factor = f" (k = {uncertainty.errors.factor:.3g})"
+    terms = (f"{name} {number(value)}{u95_texts[name]} µm" for name, value in numbers.items())
+    return f"{change}{' · '.join(terms)}{factor}"
 
 
 def place_words(picture: LivePicture) -> str:
-    """Say where the max is: ``at X 275 Y −225 Z −480``."""
+    """Format the place of the max: ``at X 275 Y −225 Z −480``."""
     node, grid = int(np.argmax(picture.field.norm_um)), picture.grid
     at = {
         name: float(np.broadcast_to(values, grid.shape).flat[node])
@@ -156,34 +155,35 @@ def place_words(picture: LivePicture) -> str:
     return f"at {formatting.list_axes(axes)}" if axes else ""
 
 
-def kept_words(picture: LivePicture) -> tuple[str, bool]:
-    """Say which part of the volume keeps the limit, and whether all of it does; see `share_below`.
+def within_limit_words(picture: LivePicture) -> tuple[str, bool]:
+    """Format the share of the volume within the limit; also return whether it is complete.
 
-    What is not kept everywhere is never said to be, however little is missing.
+    An incomplete share is never rounded to all (`share_below`).
     """
     limit = picture.state.specification.limit_um
     percent = 100.0 * share_below(picture.field, limit)
-    kept = float(picture.field.norm_um.max()) <= limit
-    shown = number(min(percent, 99.9), 0 if percent < 99.0 else 1)
-    return f"{'all' if kept else f'{shown} %'} of the volume within {limit:g} µm", kept
+    is_within = float(picture.field.norm_um.max()) <= limit
+    share = number(min(percent, 99.9), 0 if percent < 99.0 else 1)
+    return f"{'all' if is_within else f'{share} %'} of the volume within {limit:g} µm", is_within
 
 
 def subject_words(picture: LivePicture) -> list[str]:
-    """Say what is drawn beside the scene: side of a comparison, table, changes, exclusions."""
+    """List side of a comparison, table, changes and exclusions of the drawn state."""
     state = picture.drawn_state
-    found = [] if picture.compared is None else [picture.compared.title]
+    subjects = [] if picture.compared is None else [picture.compared.title]
     table = "" if picture.is_difference else table_words(state)
-    if table and not (found and table in found[0]):
-        found.append(table)
-    if edited := len(state.changed_keys):
-        found.append(f"{edited} error{'s' if edited > 1 else ''} changed")
-    if excluded := len(_left_out(state)):
-        found.append(f"{excluded} excluded")
+    if table and not (subjects and table in subjects[0]):
+        subjects.append(table)
+    edited, excluded = len(state.changed_keys), len(_left_out(state))
+    if edited:
+        subjects.append(f"{edited} error{'s' if edited > 1 else ''} changed")
+    if excluded:
+        subjects.append(f"{excluded} excluded")
     beyond = formatting.beyond_words(state.active_scene(), state.loop)
-    return [*found, *formatting.direction_words(state.scene), *filter(None, [beyond])]
+    return [*subjects, *formatting.direction_words(state.scene), *filter(None, [beyond])]
 
 
-# --- Conditions: what a reader must know who takes a picture for all of its scene -----------------
+# --- Conditions: restrictions that a reader of a picture must know --------------------------------
 
 
 def _left_out(state: AppState) -> list[str]:
@@ -194,7 +194,7 @@ def _left_out(state: AppState) -> list[str]:
 
 
 def state_conditions(state: AppState) -> tuple[str, ...]:
-    """Say which errors of a state are excluded; nothing where that changes nothing."""
+    """List the excluded errors of a state; empty where exclusion has no effect."""
     chosen, left_out = state.exclusions, _left_out(state)
     only = [key for key in state.amplitudes if key in chosen.only and key not in chosen.excluded]
     if left_out and chosen.only:
@@ -203,68 +203,68 @@ def state_conditions(state: AppState) -> tuple[str, ...]:
 
 
 def order_conditions(picture: LivePicture) -> tuple[str, ...]:
-    """Say where the first order is not enough; with a table the exact chain is drawn."""
-    both = picture.compared.sides if picture.compared and picture.is_difference else ()
-    states = [one for one in both or (picture.drawn_state,) if one.controller is None]
-    return second_order_words(*(second_order(one.active_scene(), one.loop) for one in states))
+    """Remark on states for which the first order is insufficient."""
+    sides = picture.compared.sides if picture.compared and picture.is_difference else ()
+    states = [state for state in sides or (picture.drawn_state,) if state.controller is None]
+    return second_order_words(*(second_order(state.active_scene(), state.loop) for state in states))
 
 
 def picture_conditions(picture: LivePicture) -> tuple[str, ...]:
-    """Say all that a file of a picture must say; of a difference for both sides."""
+    """List all conditions of a picture; for a difference those of both sides."""
 
     def of(state: AppState) -> tuple[str, ...]:
         view = (*formatting.direction_words(state.scene), *placed_words(state.view()))
-        more = table_words(state), formatting.beyond_words(state.active_scene(), state.loop)
-        return (*view, *state_conditions(state), *filter(None, more))
+        remarks = table_words(state), formatting.beyond_words(state.active_scene(), state.loop)
+        return (*view, *state_conditions(state), *filter(None, remarks))
 
     if picture.is_difference and picture.compared is not None:
-        found = conditions_of_both(*map(of, picture.compared.sides))
+        conditions = conditions_of_both(*map(of, picture.compared.sides))
     else:
-        found = of(picture.drawn_state)
-    return (*found, *order_conditions(picture), *range_conditions(picture), *faded_words(picture))
+        conditions = of(picture.drawn_state)
+    colours = range_conditions(picture) + faded_words(picture)
+    return (*conditions, *order_conditions(picture), *colours)
 
 
 def faded_words(picture: LivePicture) -> tuple[str, ...]:
-    """Say where colours fade, and how much of the volume that is."""
+    """Describe the meaning of faded colours, and their share of the volume."""
     if picture.faded is None:
         return ()
     percent = 100.0 * float(picture.grid.weights[picture.faded].sum())
     of = "|E|" if picture.component == "norm" else f"|E_{picture.component}|"
-    what = f"{of} ≤ U95" if picture.limit_um is None else "pass or fail undecided (95 %)"
+    what = f"{of} ≤ U95" if picture.limit_um is None else "undecided at 95 %"
     return (f"grey: {what}, {number(percent, 0)} % of the volume",)
 
 
 def range_conditions(picture: LivePicture) -> tuple[str, ...]:
-    """Say where a user has fixed the range of the colours."""
     scale = picture.scale
     fixed = picture.state.look.range_mode == "fixed"
     return (formatting.range_words(scale.low, scale.high, scale.unit),) if fixed else ()
 
 
 def look_words(picture: LivePicture) -> list[str]:
-    """Say what is looked at, and how; of a difference for both sides."""
-    machine, both = picture.drawn_state.scene.machine, picture.both_words
+    """List exaggeration, view, conditions and machine; for a difference of both sides."""
+    machine, describe = picture.drawn_state.scene.machine, picture.describe_sides
     size = " × ".join(f"{edge:.0f}" for edge in picture.grid.extent_mm)
     nodes = spell_count(picture.field.norm_um.size)
     return [
         f"exaggeration {formatting.spell_factor(picture.exaggeration)}",
-        f"{both(lambda state: state.loop.value)} loop",
-        both(lambda state: formatting.reference_words(state.scene)),
+        f"{describe(lambda state: state.loop.value)} loop",
+        describe(lambda state: formatting.reference_words(state.scene)),
         *picture_conditions(picture),
         f"{machine.title}, chain {machine.chain}",
         f"{size} mm, {nodes} nodes",
-        both(lambda state: formatting.convention_words(state.scene)),
-        both(lambda state: "exact chain" if state.controller else "first-order model"),
+        describe(lambda state: formatting.convention_words(state.scene)),
+        describe(lambda state: "exact chain" if state.controller else "first-order model"),
         "error = actual − nominal",
     ]
 
 
-def seen_words(
+def projected_labels(
     picture: LivePicture, camera: CameraMemory, height: int, width: int
 ) -> tuple[list[tuple[str, Array]], float | None]:
-    """Give words and where a camera saw their points, px from the left bottom; and its scale.
+    """Project the labels of a picture, px from the lower left; also return the scale.
 
-    That is px of a millimetre in the middle of the volume; None where it has no scale bars.
+    It is in px per mm in the middle of the volume; None without scale bars.
     """
     labels = [*axis_labels(picture), *point_labels(picture)]
     points = np.array([*(label.at_mm for label in labels), picture.grid.bounds_mm.mean(axis=0)])
@@ -273,11 +273,11 @@ def seen_words(
     forth = forth / np.linalg.norm(forth)
     right = np.cross(forth, camera.up)
     right = right / np.linalg.norm(right)
-    way = np.stack([right, np.cross(right, forth), forth], axis=1)
-    across, up, away = ((points * SCENE_PER_MM - position) @ way).T
+    rotation = np.stack([right, np.cross(right, forth), forth], axis=1)
+    across, up, away = ((points * SCENE_PER_MM - position) @ rotation).T
     px = height / 2.0 / np.tan(camera.fov_rad / 2.0) / away
     spots = np.stack([width / 2.0 + across * px, height / 2.0 + up * px], axis=-1)
     inside = (away > 0.0) & (spots > 0.0).all(axis=-1) & (spots < (width, height)).all(axis=-1)
-    seen = [(label.text, spots[k]) for k, label in enumerate(labels) if inside[k]]
+    visible = [(label.text, spots[k]) for k, label in enumerate(labels) if inside[k]]
     has_bars = picture.state.look.bars and away[-1] > 0.0
-    return seen, float(px[-1]) * SCENE_PER_MM if has_bars else None
+    return visible, float(px[-1]) * SCENE_PER_MM if has_bars else None

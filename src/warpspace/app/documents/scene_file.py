@@ -1,13 +1,12 @@
-"""A state as a scene file, and as a link; both read back to the same state.
+"""A state as a scene file and as a link; both are read back to the same state.
 
-Both hold one line of settings, a query string (``loop=relative&B=30&look.surface=cut``): what of
-the state differs from its scene as opened, the camera, and what it is compared with. In a file it
-is a comment at the head of an ordinary scene, in a link it stands behind the name of a scene that
-the app knows; any other link is the whole file, packed. A side of a comparison that is a scene, and
-what was pinned, are links of their own within that line.
+Both contain one line of settings, a query string (``loop=relative&B=30&look.surface=cut``): the
+differences of the state from its scene as opened, the camera, and the comparison. In a file it is a
+comment at the head of an ordinary scene, in a link it follows the name of a scene that the app
+knows; any other link is the packed file. Scenes and pinned states of a comparison are links within
+that line.
 
-Reading trusts nothing: every value passes the pure updates of the state, what cannot be read is
-left out and named.
+Every value passes the pure updates of the state; invalid settings are ignored and listed in notes.
 """
 
 import base64
@@ -43,59 +42,57 @@ MAX_FIELDS = 400
 SCENE, PACKED, NAME, CAMERA = "scene", "file", "name", "camera"
 _HEAD = re.compile(r"(?:[ \t]*+(?:#[^\n]*+)?\n)*+")
 _LINES = re.compile(r"^# warpspace-view: (\S*)\s*$", re.MULTILINE)
-Known = Sequence[Scene] | None
-"""Scenes that whoever opens a file or a link also has; None for those of the program."""
+KnownScenes = Sequence[Scene] | None
+"""Scenes that are available where a file or a link is opened; None for the bundled ones."""
 Opened = tuple[AppState, CameraMemory | None]
 
 
 def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
-    scene = replace(state.resulting_scene(), review=kept_views(state))
+    scene = replace(state.resulting_scene(), review=file_notes(state))
     line = settings_line(replace(state, scene=scene, loaded=None), camera)
     if len(line) > MAX_LINE:
-        raise OptionError("what is compared is too large to be stored with the scene")
-    head = f"# Saved by warpspace {__version__}. Below stands how it was looked at."
+        raise OptionError("the comparison is too large to be stored with the scene")
+    head = f"# Saved by warpspace {__version__}. The next line holds the view."
     return f"{head}\n{MARK}{line}\n\n{scene_to_toml(scene)}"
 
 
-def open_text(text: str, name: str, source: str, *, alone: bool = False) -> Opened:
-    """Build the state of a scene file that somebody has uploaded; `alone` with no comparison."""
+def open_text(text: str, name: str, source: str, *, single: bool = False) -> Opened:
     scene = _recognised(parse_scene(text, name, source, folder=None))
     line = settings_of(text)
-    return with_settings(start_state(scene), line, alone=alone), camera_of(line)
+    return with_settings(start_state(scene), line, single=single), camera_of(line)
 
 
 def settings_of(text: str) -> str:
-    """Give the line of settings at the head of a scene file; empty where there is none."""
+    """Return the line of settings at the head of a scene file; empty where there is none."""
     head = _HEAD.match(text)
     return "&".join(filter(None, _LINES.findall(head[0] if head else "")))
 
 
-def _find(name: str, known: Known) -> Scene | None:
-    if known is None:
+def _find(name: str, scenes: KnownScenes) -> Scene | None:
+    if scenes is None:
         return load_scene(name) if name in scene_names() else None
-    return next((scene for scene in known if scene.name == name), None)
+    return next((scene for scene in scenes if scene.name == name), None)
 
 
 def _recognised(scene: Scene) -> Scene:
-    """Give a machine written inline its bodies back where only its axes' ends and ways differ."""
     machine = scene.machine
-    known = known_alike(machine)
-    if known is None:
+    twin = known_alike(machine)
+    if twin is None:
         return scene
-    bodies, gantries = machine.bodies or known.bodies, machine.gantries or known.gantries
-    same = replace(known, axes=machine.axes, bodies=bodies, gantries=gantries)
+    bodies, gantries = machine.bodies or twin.bodies, machine.gantries or twin.gantries
+    same = replace(twin, axes=machine.axes, bodies=bodies, gantries=gantries)
     return replace(scene, model=replace(scene.model, machine=same))
 
 
-def state_to_link(state: AppState, camera: CameraMemory | None, known: Known) -> str:
-    link = _spell(state, camera, known)
+def state_to_link(state: AppState, camera: CameraMemory | None, scenes: KnownScenes) -> str:
+    link = _spell(state, camera, scenes)
     if len(link) > MAX_LINK:
-        raise OptionError("this is too large for a link; save it as a file instead")
+        raise OptionError("the state is too large for a link; save it as a file")
     return link
 
 
-def _spell(state: AppState, camera: CameraMemory | None, known: Known) -> str:
-    return named_link(state, camera, known) or _packed(state, camera)
+def _spell(state: AppState, camera: CameraMemory | None, scenes: KnownScenes) -> str:
+    return named_link(state, camera, scenes) or _packed(state, camera)
 
 
 def _packed(state: AppState, camera: CameraMemory | None) -> str:
@@ -104,40 +101,40 @@ def _packed(state: AppState, camera: CameraMemory | None) -> str:
     return urlencode({NAME: state.scene.name, PACKED: word})
 
 
-def named_link(state: AppState, camera: CameraMemory | None, known: Known) -> str:
-    """Spell a state of a scene that others have as a link of any length; any other as nothing."""
+def named_link(state: AppState, camera: CameraMemory | None, scenes: KnownScenes) -> str:
+    """Write a link to a known scene, of any length; empty for other scenes."""
     scene = state.scene
     plain = _is_plain(state) and state.review == scene.review
-    if not plain or _find(scene.name, known) != scene:
+    if not plain or _find(scene.name, scenes) != scene:
         return ""
-    line = settings_line(state, camera, known)
+    line = settings_line(state, camera, scenes)
     return "&".join(filter(None, (urlencode({SCENE: scene.name}), line)))
 
 
 def _is_plain(state: AppState) -> bool:
-    """Tell whether a line of settings spells all in which a state differs from its scene."""
+    """Return whether settings alone describe the differences of a state from its scene."""
     return state.loaded is None and state.tolerances == state.scene.tolerances
 
 
-def open_link(link: str, known: Known) -> Opened:
+def open_link(link: str, scenes: KnownScenes) -> Opened:
     if len(link) > MAX_LINK:
         raise OptionError(
             f"the link is {len(link):,} characters long; expected at most {MAX_LINK:,}"
         )
-    return _read_link(link, known)
+    return _read_link(link, scenes)
 
 
-def _read_link(link: str, known: Known, *, alone: bool = False) -> Opened:
+def _read_link(link: str, scenes: KnownScenes, *, single: bool = False) -> Opened:
     pairs = dict(_pairs(link))
     if PACKED in pairs:
         name = safe_name(pairs.get(NAME, ""), "link")
-        return open_text(_unpack(pairs[PACKED]), name, "the scene in the link", alone=alone)
+        return open_text(_unpack(pairs[PACKED]), name, "the scene in the link", single=single)
     name = pairs.pop(SCENE, "")
-    scene = _find(name, known)
+    scene = _find(name, scenes)
     if scene is None:
-        raise OptionError(f"the link names the scene {name[:LONGEST_NAME]!r}, which is not here")
+        raise OptionError(f"the link names an unknown scene {name[:LONGEST_NAME]!r}")
     line = urlencode(pairs)
-    return with_settings(start_state(scene), line, known, alone=alone), camera_of(line)
+    return with_settings(start_state(scene), line, scenes, single=single), camera_of(line)
 
 
 def _unpack(packed: str) -> str:
@@ -156,40 +153,40 @@ def _unpack(packed: str) -> str:
 
 
 def settings_line(
-    state: AppState, camera: CameraMemory | None = None, known: Known = None, *, rest: bool = False
-) -> str:
-    """Spell what differs from the scene as opened; `rest` from that scene at rest."""
-    opened = start_state(state.scene).at_rest() if rest else start_state(state.scene)
+    state: AppState, camera: CameraMemory | None = None, scenes: KnownScenes = None,
+    *, at_rest: bool = False,
+) -> str:  # fmt: skip
+    """Write the differences from the scene as opened; `at_rest` from `AppState.at_rest`."""
+    opened = start_state(state.scene).at_rest() if at_rest else start_state(state.scene)
     pairs = [
-        (leaf.linked, spell_value(leaf, now))
+        (leaf.linked, spell_value(leaf, stored(state, leaf.path)))
         for leaf in leaves(state).values()
-        if leaf.linked and (now := stored(state, leaf.path)) != stored(opened, leaf.path)
+        if leaf.linked and stored(state, leaf.path) != stored(opened, leaf.path)
     ]
     if camera is not None:
         numbers = (*camera.position, *camera.look_at, *camera.up, camera.fov_rad)
         pairs.append((CAMERA, ",".join(f"{number:.9g}" for number in numbers)))
-    return urlencode([*pairs, *linked_forms(state), *_sides(state, known)])
+    return urlencode([*pairs, *linked_forms(state), *_sides(state, scenes)])
 
 
 def with_settings(
-    state: AppState, line: str, known: Known = None, *, alone: bool = False
+    state: AppState, line: str, scenes: KnownScenes = None, *, single: bool = False
 ) -> AppState:
-    """Apply a line of settings to a state; `alone` without a comparison."""
-    pairs = [pair for pair in _pairs(line) if not (alone and pair[0].startswith(PREFIX))]
-    state, unread = _with_sides(state, dict(pairs), known), list[str]()
+    pairs = [pair for pair in _pairs(line) if not (single and pair[0].startswith(PREFIX))]
+    state, unread = _with_sides(state, dict(pairs), scenes), list[str]()
     for name, text in pairs:
         if name == CAMERA or name in SIDES:
             continue
-        # what there is depends on what was set before, such as the components of a quantity
-        leaf = {one.linked: one for one in leaves(state).values() if one.linked}.get(name)
+        # leaves depend on earlier settings, such as the components of a quantity
+        leaf = {entry.linked: entry for entry in leaves(state).values() if entry.linked}.get(name)
         try:
             state = set_leaf(state, leaf, text) if leaf else with_form(state, name, text)
         except Unreadable:
             unread.append(f"{name}={text}"[:60])
     if unread:
-        more = f" and {len(unread) - 4} more" if len(unread) > 4 else ""
+        suffix = f" and {len(unread) - 4} more" if len(unread) > 4 else ""
         named = ", ".join(unread[:4])
-        return state.noted(f"settings left out, since they mean nothing here: {named}{more}")
+        return state.noted(f"ignored settings (unknown or invalid): {named}{suffix}")
     return state
 
 
@@ -199,7 +196,7 @@ def _pairs(line: str) -> list[tuple[str, str]]:
     try:
         return parse_qsl(line, keep_blank_values=True, max_num_fields=MAX_FIELDS)
     except ValueError:
-        raise OptionError("there are too many settings; this program did not write them") from None
+        raise OptionError(f"too many settings; expected at most {MAX_FIELDS}") from None
 
 
 CAMERA_NUMBERS = 10
@@ -208,7 +205,7 @@ FOV_RAD = (0.01, 2.5)
 
 
 def camera_of(line: str) -> CameraMemory | None:
-    """Read the camera of a line of settings; None where there is none that can be used."""
+    """Parse the camera of a line of settings; None where it is missing or invalid."""
     try:
         numbers = [parse_number(word) for word in dict(_pairs(line)).get(CAMERA, "").split(",")]
     except ValueError:
@@ -223,57 +220,57 @@ def camera_of(line: str) -> CameraMemory | None:
     return CameraMemory(position, look_at, up, numbers[9])
 
 
-# --- Notes: what was on the screen, and back to it -----------------------------------------------
+# --- Views of notes -------------------------------------------------------------------------------
 
 
 def view_of(state: AppState, camera: CameraMemory | None) -> str:
-    """Spell what is on the screen, for a note: relative to the scene as opened where that does."""
-    shown = replace(state, review=())
-    link = "" if _is_plain(state) else _packed(shown, camera)
-    # curves of thousands of points are left to the scene
+    """Write the present view for a note: relative to the scene as opened where possible."""
+    viewed = replace(state, review=())
+    link = "" if _is_plain(state) else _packed(viewed, camera)
+    # curves of thousands of points are stored in the scene only
     fits = 0 < len(link) <= MAX_NOTE_VIEW
-    return link if fits else settings_line(shown, camera, rest=True)
+    return link if fits else settings_line(viewed, camera, at_rest=True)
 
 
-def kept_views(state: AppState) -> tuple[Note, ...]:
-    """Give the notes as a file keeps them, whose scene may differ from the one as opened."""
+def file_notes(state: AppState) -> tuple[Note, ...]:
+    """Return the notes for a file, whose scene may differ from the one as opened."""
     opened = start_state(replace(state.origin, review=()))
 
-    def kept(note: Note) -> Note:
+    def with_packed_view(note: Note) -> Note:
         if not note.view or PACKED in dict(_pairs(note.view)):
             return note
         link = _packed(*reopened(opened, note))
         return replace(note, view=link) if len(link) <= MAX_NOTE_VIEW else note
 
-    return state.review if _is_plain(state) else tuple(map(kept, state.review))
+    return state.review if _is_plain(state) else tuple(map(with_packed_view, state.review))
 
 
-def reopened(state: AppState, note: Note, known: Known = None) -> Opened:
-    """Give what was on the screen when a note was made; what cannot be restored is named."""
+def reopened(state: AppState, note: Note, scenes: KnownScenes = None) -> Opened:
+    """Restore the view of a note; its state lists settings that cannot be restored."""
     if not note.view:
         return state, None
     origin = state.origin
     if PACKED in dict(_pairs(note.view)):
-        found, camera = _read_link(note.view, known)
-        same = found.scene.machine.axes == origin.machine.axes
-        found = replace(found, loaded=None if found.scene == origin else origin,
-                        start=state.start if same else found.start)  # fmt: skip
+        viewed, camera = _read_link(note.view, scenes)
+        same = viewed.scene.machine.axes == origin.machine.axes
+        viewed = replace(viewed, loaded=None if viewed.scene == origin else origin,
+                        start=state.start if same else viewed.start)  # fmt: skip
     else:
-        found = with_settings(start_state(origin).at_rest(), note.view, known)
+        viewed = with_settings(start_state(origin).at_rest(), note.view, scenes)
         camera = camera_of(note.view)
-    return replace(found, review=state.review, page=state.page, forms=state.forms), camera
+    return replace(viewed, review=state.review, page=state.page, forms=state.forms), camera
 
 
 # --- The sides of a comparison in it --------------------------------------------------------------
 
 PREFIX = "compare."
 PINNED = "pinned"
-NOW = "now"  # what is steered, in files and links
+NOW = "now"  # the present state, in files and links
 LONGEST_TITLE = 200
 SIDES = [PREFIX + name for name in ("pinned", "a", "b", "pinned.title", "a.title", "b.title")]
 
 
-def _sides(state: AppState, known: Known) -> Iterator[tuple[str, str]]:
+def _sides(state: AppState, scenes: KnownScenes) -> Iterator[tuple[str, str]]:
     chosen = state.comparison
     for name, side in (("pinned", chosen.pinned), ("a", chosen.a), ("b", chosen.b)):
         if side is None or (name == "a" and side.state is None):
@@ -283,59 +280,58 @@ def _sides(state: AppState, known: Known) -> Iterator[tuple[str, str]]:
         elif name != PINNED and not side.is_scene:
             text, usual = PINNED, side.title
         else:
-            text = _spell(side.state, None, known)
+            text = _spell(side.state, None, scenes)
             usual = scene_side(side.state.scene).title if side.is_scene else ""
         yield PREFIX + name, text
         if side.title != usual:
             yield f"{PREFIX}{name}.title", side.title
 
 
-def _with_sides(state: AppState, given: Mapping[str, str], known: Known) -> AppState:
+def _with_sides(state: AppState, settings: Mapping[str, str], scenes: KnownScenes) -> AppState:
     sides: dict[str, Side | None] = {PINNED: None}
     for name in (PINNED, "a", "b"):
-        text = given.get(PREFIX + name)
+        text = settings.get(PREFIX + name)
         if text is None or text == NOW:
             sides[name] = None if text is None else Side()
         elif text == PINNED:
             sides[name] = sides[PINNED]
             if sides[PINNED] is None:
-                raise OptionError("the comparison is with a pinned state, but holds none")
+                raise OptionError("the comparison lacks its pinned state")
         else:
-            found, _ = _read_link(text, known, alone=True)
+            opened, _ = _read_link(text, scenes, single=True)
             if name == PINNED:
-                state = state.noted(*(f"{BEFORE}: {note}" for note in found.notes))
-                side = pinned_side(plain_state(found.without_notes()))
+                state = state.noted(*(f"{BEFORE}: {note}" for note in opened.notes))
+                side = pinned_side(plain_state(opened.without_notes()))
             else:
-                side = scene_side(found.scene)
-            title = given.get(f"{PREFIX}{name}.title", "")[:LONGEST_TITLE]
+                side = scene_side(opened.scene)
+            title = settings.get(f"{PREFIX}{name}.title", "")[:LONGEST_TITLE]
             usual = title in (NOW, PRESENT, NOBODY, "")
             sides[name] = side if usual else replace(side, title=title)
     compared = replace(state.comparison, a=sides["a"] or Side(), b=sides["b"], pinned=sides[PINNED])
     return replace(state, comparison=compared)
 
 
-# --- The scenes a tab can choose from -------------------------------------------------------------
-# The server's own, and the newest that were opened in it.
+# --- Scenes of a tab: those of the server, and the latest opened ones -----------------------------
 
 MOST_OPENED = 20
 
 
 class SceneList(dict[str, Scene]):
-    """Scenes by the title shown, each title once."""
+    """Scenes by unique title."""
 
     def __init__(self, scenes: Mapping[str, Scene]) -> None:
         super().__init__(scenes)
-        self.fixed = tuple(scenes.values())  # those that whoever opens a link here has as well
+        self.fixed = tuple(scenes.values())  # available to all tabs
 
     def add(self, scene: Scene) -> tuple[str, str]:
-        """Take in an opened scene; give its title, and that of one that has left for it."""
-        for title, known in self.items():
-            if known is scene or known == scene:
+        """Add an opened scene; return its title, and that of a scene dropped for it."""
+        for title, listed in self.items():
+            if listed is scene or listed == scene:
                 return title, ""
-        own = title = scene.title or scene.name
+        base = title = scene.title or scene.name
         number = 2
         while title in self or title in (PRESENT, NOBODY):
-            title, number = f"{own} ({number})", number + 1
+            title, number = f"{base} ({number})", number + 1
         self[title] = scene
         if len(self) <= len(self.fixed) + MOST_OPENED:
             return title, ""

@@ -1,4 +1,4 @@
-"""Files that a page gives and takes: links, what was received, what an export asks for."""
+"""Links, uploaded files, and names of exported files."""
 
 import base64
 import binascii
@@ -14,24 +14,23 @@ from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_SCENE_BYTES
 
 # --- Links: a state as one word in the page's address ---------------------------------------------
-# It consists of letters and digits only, since viser's client writes the address anew when it
-# starts (which drops what stands behind a #, and would unpack an encoded value).
+# Letters and digits only, since viser's client rewrites the address when it starts (it drops a
+# fragment and would decode an encoded value).
 
 
 def pack(link: str) -> str:
-    """Spell a query string as one word that needs no escaping in an address."""
+    """Encode a query string as one word that needs no escaping in an address."""
     return base64.urlsafe_b64encode(link.encode()).decode().rstrip("=")
 
 
 def unpack(word: str) -> str:
-    """Read what `pack` has written."""
     try:
         return base64.urlsafe_b64decode(word + "=" * (-len(word) % 4)).decode()
     except (binascii.Error, ValueError):
-        raise OptionError("the link cannot be read; was it cut?") from None
+        raise OptionError("the link cannot be read; it may be truncated") from None
 
 
-# --- Files that a browser sends: a name that can be used, and the text in them --------------------
+# --- Uploaded files -------------------------------------------------------------------------------
 
 _UNSAFE = re.compile(r"[^A-Za-z0-9._ -]+")
 LONGEST_NAME = 60
@@ -39,7 +38,7 @@ LONGEST_SIZE = 16  # digits
 
 
 def safe_name(name: str, fallback: str = "scene") -> str:
-    """Make a file name of what a user or a browser calls something."""
+    """Build a safe file name, without ending, from any name."""
     last = name.replace("\\", "/").rsplit("/", 1)[-1]
     stem = last.rsplit(".", 1)[0] if "." in last.strip(".") else last
     clean = _UNSAFE.sub("_", stem).strip(" ._-")[:LONGEST_NAME].strip(" ._-")
@@ -47,28 +46,28 @@ def safe_name(name: str, fallback: str = "scene") -> str:
 
 
 def safe_file_name(name: str) -> str:
-    """Make a file name that keeps its ending, or gets ``.txt`` where it has none."""
+    """Build a safe file name with the ending of the name, or ``.txt``."""
     last = name.replace("\\", "/").rsplit("/", 1)[-1]
     ending = last.rsplit(".", 1)[-1] if "." in last else "txt"
     return f"{safe_name(last, 'file')}.{safe_name(ending, 'txt')}"
 
 
 IN_BOX = {"part": (".stl", ".obj", ".ply", ".glb"), "program": (".ngc", ".nc", ".tap")}
-"""Endings of what stands in the box, by the part of the page that takes it."""
+"""Endings of part and program files, by panel."""
 
 
 def read_upload(
     value: str, most_bytes: int = MAX_SCENE_BYTES, what: str = "scene file"
 ) -> tuple[str, bytes]:
-    """Give name and bytes of a file that a page has sent; it sends none of one too large."""
-    told, _, rest = value.partition("\n")
-    name, _, coded = rest.rpartition("\n")
+    """Parse name and bytes of an uploaded file; a page omits the bytes of one too large."""
+    size_text, _, payload = value.partition("\n")
+    name, _, coded = payload.rpartition("\n")
     name = safe_file_name(name)
     try:
         content = base64.b64decode(coded)
-        size = max(int(told[:LONGEST_SIZE]), len(content))
+        size = max(int(size_text[:LONGEST_SIZE]), len(content))
     except ValueError:
-        raise OptionError(f"{name} has not arrived whole; try again") from None
+        raise OptionError(f"{name} was not received completely; try again") from None
     if size > most_bytes:
         raise OptionError(
             f"{name} is {size / 2**20:.1f} MB large; expected a {what} of at most"
@@ -86,51 +85,52 @@ def upload_text(content: bytes, source: str, what: str = "scene file") -> str:
         ) from None
 
 
-MOST_NOTES = 12  # remarks on a robot description that are shown
+MOST_NOTES = 12  # remarks on a robot description
 
 
 def robot_text(name: str, content: bytes) -> tuple[str, list[str]]:
-    """Read a robot description (URDF) as a scene file, without meshes; with remarks on it."""
+    """Convert a robot description (URDF) to a scene file, without meshes; return remarks , too."""
     from warpspace.scene.urdf import imported_text, omitted_notes, place_robot, read_robot
 
     with TemporaryDirectory() as folder:
         path = Path(folder) / safe_file_name(name)
         path.write_bytes(content)
-        robot, others = read_robot(path)
-    found = place_robot(robot, name)
-    notes = [*found.notes, *omitted_notes(robot, others, found.frame_of)]
-    return imported_text(found.machine, safe_file_name(name), notes, {}), notes[:MOST_NOTES]
+        robot, unplaced = read_robot(path)
+    placed = place_robot(robot, name)
+    notes = [*placed.notes, *omitted_notes(robot, unplaced, placed.frame_of)]
+    return imported_text(placed.machine, safe_file_name(name), notes, {}), notes[:MOST_NOTES]
 
 
-# --- What files show while two states are compared: what is drawn, under its own name -------------
+# --- Files of a comparison ------------------------------------------------------------------------
 
-AS_DRAWN = "View and HTML show what is drawn."
+AS_DRAWN = "View and HTML show the drawing."
 
 
 def shown_sides(picture: LivePicture, *, sheet: bool = False) -> list[AppState]:
-    """Give the state that is drawn; A and B of a difference, on a sheet of any comparison."""
-    found = picture.compared
-    if found is None:
+    """List the drawn states: one, or A and B of a difference or of a sheet."""
+    compared = picture.compared
+    if compared is None:
         return [picture.drawn_state]
-    both = [
+    sides = [
         replace(side, scene=replace(side.scene, name=f"{letter}: {title}", title=title))
-        for letter, title, side in zip("AB", found.titles, found.sides, strict=True)
+        for letter, title, side in zip("AB", compared.titles, compared.sides, strict=True)
     ]
-    if found.shown == "difference" or (sheet and has_sheet(picture)):
-        return both
-    return [both["ab".index(found.shown)]]
+    if compared.view == "difference" or (sheet and has_sheet(picture)):
+        return sides
+    return [sides["ab".index(compared.view)]]
 
 
 def has_sheet(picture: LivePicture) -> bool:
-    """Tell whether two machines are compared that fit on one sheet, with their difference."""
-    found = picture.compared
-    return found is not None and not found.refused and found.sides[0].loop == found.sides[1].loop
+    """Return whether both sides of a comparison and their difference fit on one sheet."""
+    compared = picture.compared
+    if compared is None or compared.refused:
+        return False
+    return compared.sides[0].loop == compared.sides[1].loop
 
 
 def file_stem(picture: LivePicture) -> str:
-    """Name the files of a picture, without an ending; of one with a table say so."""
-    found, chosen = picture.compared, picture.state.comparison
-    if found is None or drawn_tables(picture.state):
+    compared, chosen = picture.compared, picture.state.comparison
+    if compared is None or drawn_tables(picture.state):
         tail = "_with_table" if drawn_tables(picture.state) else ""
         return safe_name(picture.state.scene.name) + tail
     before = chosen.a.state is not None and not chosen.a.is_scene
@@ -140,16 +140,18 @@ def file_stem(picture: LivePicture) -> str:
         else "present"
         for side, word in ((chosen.a, BEFORE), (chosen.b or Side(), AFTER))
     )  # fmt: skip
-    return safe_name({"a": f"A_{a}", "b": f"B_{b}"}.get(found.shown, f"{b}_minus_{a}"))
+    return safe_name({"a": f"A_{a}", "b": f"B_{b}"}.get(compared.view, f"{b}_minus_{a}"))
 
 
 def exported_words(picture: LivePicture) -> str:
-    """Say what pictures and exports show, where that is not simply what is steered."""
-    found, tilts = picture.compared, picture.state.look.tilts
-    if without := without_words(picture.state):
+    """Describe the contents of exports where they differ from the present state."""
+    compared, tilts = picture.compared, picture.state.look.tilts
+    without = without_words(picture.state)
+    if without:
         return f"Figure, exports, Save and Link: {without[0].lower()}{without[1:]} {AS_DRAWN}"
-    if found is None:
+    if compared is None:
         return "The figure shows the tilts of the tool axis as needles on the box." if tilts else ""
     what = "the position errors of " if tilts else ""
     sheet = f" The figure shows {what}A, B and B − A on one sheet." if has_sheet(picture) else ""
-    return f"Pictures and exports show {found.title}.{sheet} Save and Link keep the comparison."
+    pictures = f"Pictures and exports show {compared.title}."
+    return f"{pictures}{sheet} Save and Link include the comparison."

@@ -1,1 +1,1 @@
-"""Everything in 3-D, and the camera."""
+"""The 3-D drawing and its camera."""

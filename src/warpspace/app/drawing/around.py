@@ -1,4 +1,4 @@
-"""What is drawn on and around the box: axes, traces, paths, arrows, markers."""
+"""Drawing of axes, traces, paths, arrows and markers on and around the box."""
 
 from functools import lru_cache
 
@@ -21,37 +21,37 @@ from warpspace.app.drawing.shapes import (
 )
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import chosen_trace, points_on_traces
-from warpspace.app.evaluation.point_explanation import answer, measured
+from warpspace.app.evaluation.point_explanation import explain_point, measure_distance
 from warpspace.app.evaluation.scene_overlays import AT_LINE
 from warpspace.formats.source import MAX_LINES
 from warpspace.geometry.surfaces import corners, round_down
 from warpspace.picture.map_mesh import outline_pieces
 from warpspace.units import MM_PER_UM, Array
 
-# --- Sizes, as parts of the longest edge of the box -----------------------------------------------
+# --- Sizes relative to the longest edge of the box ------------------------------------------------
 
 HEAD, BALL = 0.034, 0.009  # of an arrow, and the marker of the worst point
-APART = 0.002  # distance from which nominal and actual trace are both drawn
-TURNED = 0.014  # diameter of a traced point while the table turns
-ASKED, AXIS_HALF, DASH = 0.011, 0.32, 0.02
-"""Marker of the point that was asked about, half the axis that turns it, dash of its lever."""
+APART = 0.002  # distance from which both the nominal and the actual trace are drawn
+TURNED = 0.014  # diameter of a traced point while the table rotates
+POINT_MARKER, AXIS_HALF, DASH = 0.011, 0.32, 0.02
+"""Marker of the picked point, half length of the axis of rotation, dash of the lever."""
 RESIDUAL_HEAD, LONGEST_RESIDUAL = 0.025, 0.2
-MOST_OUTSIDE, OUTSIDE = 4000, 0.006  # points beyond the travel that are marked, and their size
+MOST_OUTSIDE, OUTSIDE = 4000, 0.006  # marked points beyond the travel, and their size
 UNMEASURED, SEEN_THROUGH = 0.008, 0.5  # size of dots, and opacity of ellipsoids
 GREY = (70, 78, 90)
-GIZMO = "/part/gizmo"  # what moves the part
+GIZMO = "/part/gizmo"  # moves the part
 
-ACCENT = (194, 24, 91)  # colour of everything that answers "why?"; it is in no colour map
+ACCENT = (194, 24, 91)  # colour of explanations; not part of any colour map
 RESIDUALS = {True: (138, 143, 152), False: (47, 116, 192)}
-"""Before the calibration, and after; those of the chart."""
+"""Colours before the calibration (True) and after, as in the chart."""
 MOST_RESIDUALS = 400
-HEAD_PART = 0.7  # longest head, as a part of its arrow
-STROKES, SLANT = 12, 0.3  # lines of a head, and how far they slant, as a part of its length
+HEAD_PART = 0.7  # longest head, relative to its arrow
+STROKES, SLANT = 12, 0.3  # lines of a head, and its radius relative to its length
 
 
-def around(picture: LivePicture) -> Shapes:
-    """Draw all that follows the picture beside the box and the machine."""
-    draws = (_axes, _traces, _path, _part, _program, _other_side, _asked, _measured, _marks,
+def draw_surroundings(picture: LivePicture) -> Shapes:
+    """Draw everything of a picture except the box and the machine."""
+    draws = (_axes, _traces, _path, _part, _program, _other_side, _point, _measured, _marks,
              _uncertainty)  # fmt: skip
     return {name: shape for draw in draws for name, shape in draw(picture).items()}
 
@@ -73,14 +73,14 @@ def _axis_lines(of: tuple[AxisLabels, ...], tick: float, rgb: Rgb) -> SceneNode 
 def _traces(picture: LivePicture) -> Shapes:
     """Draw traces of rotary axes: one in colour, with its nominal circle; the others faint.
 
-    What no error moves is not drawn, nor what the actual trace covers of the nominal one.
+    Traces without error are not drawn, nor is the nominal trace where it is covered.
     """
     moved = picture.moved_traces
     if not moved:
         return {}
     name = chosen_trace(picture)
-    others = [line.actual_mm for other, line in moved.items() if other != name]
-    faint = lines(polylines(others), colour(picture, "trace_elsewhere"), 1.0)
+    other_traces = [line.actual_mm for other, line in moved.items() if other != name]
+    faint = lines(polylines(other_traces), colour(picture, "trace_elsewhere"), 1.0)
     if not name:
         return {"/traces/others": faint}
     nominal, actual = (polylines([at]) for at in (moved[name].nominal_mm, moved[name].actual_mm))
@@ -90,11 +90,11 @@ def _traces(picture: LivePicture) -> Shapes:
 
 
 def _path(picture: LivePicture) -> Shapes:
-    found = picture.bench
-    if found is None:
+    overlay = picture.bench
+    if overlay is None:
         return {}
-    actual = found.drawn_mm(picture.exaggeration)[found.at]
-    return _pair(picture, "/test", found.nominal_mm[found.at], actual)
+    actual = overlay.drawn_mm(picture.exaggeration)[overlay.at]
+    return _pair(picture, "/test", overlay.nominal_mm[overlay.at], actual)
 
 
 def _pair(picture: LivePicture, root: str, nominal: Array, actual: Array) -> Shapes:
@@ -127,10 +127,10 @@ def _program(picture: LivePicture) -> Shapes:
     if path is None:
         return {}
     drawn, (values, scale) = path.drawn_mm(picture.exaggeration), picture.coloured(path)
-    linear = np.clip(level_colours(diverging=scale.diverging), 0.0, 1.0)  # viser wants lines so
+    linear = np.clip(level_colours(diverging=scale.diverging), 0.0, 1.0)  # range of viser's lines
     colours = (255.0 * linear).astype(np.uint8)[colour_levels(scale, values)]
-    asked = index_of(picture.state.forms.get(AT_LINE, ""), MAX_LINES)
-    marker = dots(drawn[path.of.line == asked][-1:], ASKED * picture.size_mm, ACCENT)
+    line = index_of(picture.state.forms.get(AT_LINE, ""), MAX_LINES)
+    marker = dots(drawn[path.of.line == line][-1:], POINT_MARKER * picture.size_mm, ACCENT)
     pair = _pair(picture, "/program", path.nominal_mm[path.at], drawn[path.at])
     return {**pair, "/program/actual": lines(drawn[path.at], colours, 3.0), "/program/line": marker}
 
@@ -143,19 +143,19 @@ def _other_side(picture: LivePicture) -> Shapes:
     return {"/compare/other": lines(edges, colour(picture, "edge"), 2.0)}
 
 
-def _asked(picture: LivePicture) -> Shapes:
+def _point(picture: LivePicture) -> Shapes:
     picked, size = picture.state.picked, picture.size_mm
     if picked is None or picture.is_difference:
         return {}
-    found = answer(picture.drawn_state, picked, picture.exaggeration)
-    point = found.explanation.nominal_mm + found.shift_mm
+    explained = explain_point(picture.drawn_state, picked, picture.exaggeration)
+    point = explained.explanation.nominal_mm + explained.shift_mm
     shapes = {
-        "/why/marker": ball(found.drawn_mm, ASKED * size, ACCENT),
-        "/why/vector": lines(np.stack([point, found.drawn_mm])[None], ACCENT, 3.0),
+        "/why/marker": ball(explained.drawn_mm, POINT_MARKER * size, ACCENT),
+        "/why/vector": lines(np.stack([point, explained.drawn_mm])[None], ACCENT, 3.0),
     }
-    for part in found.explanation.contributions:
+    for part in explained.explanation.contributions:
         if part.key == picture.state.lever:
-            origin, half = part.origin_mm + found.shift_mm, AXIS_HALF * size * part.direction
+            origin, half = part.origin_mm + explained.shift_mm, AXIS_HALF * size * part.direction
             axis, lever = np.array([[origin - half, origin + half], [origin, point]])[:, None]
             shapes["/why/axis"] = lines(axis, ACCENT, 3.5)
             shapes["/why/lever"] = lines(dashes(lever, DASH * size, 0.6 * DASH * size), ACCENT, 2.0)
@@ -163,15 +163,15 @@ def _asked(picture: LivePicture) -> Shapes:
 
 
 def _measured(picture: LivePicture) -> Shapes:
-    found = measured(picture)
-    if found is None:
+    distance = measure_distance(picture)
+    if distance is None:
         return {}
-    _, nominal, actual = found
-    ends = [[0, 1], [2, 0], [2, 1]] if len(actual) == 3 else [[0, 1]]  # and edges of the angle
+    _, nominal, actual = distance
+    ends = [[0, 1], [2, 0], [2, 1]] if len(actual) == 3 else [[0, 1]]  # with legs of the angle
     return {
         "/measured/nominal": lines(nominal[ends], colour(picture, "edge"), 1.5),
         "/measured/actual": lines(actual[ends], ACCENT, 3.0),
-        "/measured/points": dots(actual, ASKED * picture.size_mm, ACCENT),
+        "/measured/points": dots(actual, POINT_MARKER * picture.size_mm, ACCENT),
     }
 
 
@@ -192,28 +192,28 @@ def _marks(picture: LivePicture) -> Shapes:
 
 
 def _uncertainty(picture: LivePicture) -> Shapes:
-    """Draw U95 at corners and the clicked point as ellipsoids, and dots on what was not measured.
+    """Draw ellipsoids of U95 at corners and picked point, and dots where nothing was measured.
 
-    The extent of an ellipsoid along any direction is U95 of the error along it, exaggerated.
+    The extent of an ellipsoid along a direction is U95 of the error along it, exaggerated.
     """
-    found, look, scene = picture.uncertainty, picture.state.look, picture.drawn_state.scene
+    uncertainty, look, scene = picture.uncertainty, picture.state.look, picture.drawn_state.scene
     shapes: dict[str, SceneNode | None] = {}
-    if found is not None and scene.covariance is not None and look.unmeasured:
+    if uncertainty is not None and scene.covariance is not None and look.unmeasured:
         surface = picture.topology.surface.nodes
         outside = scene.covariance.outside(picture.grid.coordinates, picture.shape)
-        seen = surface[outside.reshape(-1)[surface]]
-        at = picture.drawn_mm.reshape(-1, 3)[seen]
+        unmeasured = surface[outside.reshape(-1)[surface]]
+        at = picture.drawn_mm.reshape(-1, 3)[unmeasured]
         shapes["/uncertainty/unmeasured"] = dots(at, UNMEASURED * picture.size_mm, GREY)
-    if found is None or not found.errors.is_known or not look.ellipsoids:
+    if uncertainty is None or not uncertainty.errors.is_known or not look.ellipsoids:
         return shapes
     chosen, picked = corners(picture.shape), picture.state.picked
     at = [*picture.drawn_mm.reshape(-1, 3)[chosen]]
-    covariances = [*found.expanded_um2.reshape(-1, 3, 3)[chosen]]
+    covariances = [*uncertainty.expanded_um2.reshape(-1, 3, 3)[chosen]]
     if picked is not None:
-        asked = answer(picture.drawn_state, picked, picture.exaggeration)
-        if asked.uncertainty is not None:
-            at.append(asked.drawn_mm)
-            covariances.append(asked.uncertainty.expanded_um2)
+        explained = explain_point(picture.drawn_state, picked, picture.exaggeration)
+        if explained.uncertainty is not None:
+            at.append(explained.drawn_mm)
+            covariances.append(explained.uncertainty.expanded_um2)
     factor = picture.exaggeration * MM_PER_UM
     for number, (middle, square) in enumerate(zip(at, covariances, strict=True)):
         body = ellipsoid(middle, factor**2 * square, ACCENT, SEEN_THROUGH)
@@ -222,7 +222,7 @@ def _uncertainty(picture: LivePicture) -> Shapes:
 
 
 def turned_points(picture: LivePicture, position: dict[str, float]) -> Shapes:
-    """Draw the traced points at a position of the axis that is played; none while none is."""
+    """Draw the traced points at a position of the animated axis; none without one."""
     if not position or not picture.state.shown.traces:
         return {}
     size = TURNED * picture.size_mm
@@ -236,12 +236,12 @@ def turned_points(picture: LivePicture, position: dict[str, float]) -> Shapes:
 def residuals(
     foot_mm: Array, vector_mm: Array, size_mm: float, *, before: bool
 ) -> tuple[Shapes, float]:
-    """Draw what a calibration leaves as arrows, the longest about a fifth of the box.
+    """Draw the residuals of a calibration as arrows, the longest about a fifth of the box.
 
-    Returns with them the factor they are drawn with; 0 where none has a length.
+    Also return their exaggeration; 0 where all have zero length.
     """
-    every = max(1, -(-len(foot_mm) // MOST_RESIDUALS))
-    foot, vector = foot_mm[::every], vector_mm[::every]
+    stride = max(1, -(-len(foot_mm) // MOST_RESIDUALS))
+    foot, vector = foot_mm[::stride], vector_mm[::stride]
     longest = float(np.linalg.norm(vector, axis=-1).max(initial=0.0))
     if longest <= 0.0:
         return {}, 0.0
@@ -251,9 +251,9 @@ def residuals(
 
 
 def arrows(start_mm: Array, end_mm: Array, head_mm: float) -> Array:
-    """Give arrows, [n, 3] to [n, 3], as pieces of line: shafts, and strokes of their heads.
+    """Build arrows, [n, 3] to [n, 3], from line segments: shafts, and strokes of the heads.
 
-    Short arrows get a smaller head of the same shape; without length one shrinks to a point.
+    Short arrows have a smaller head of the same shape; one of zero length is a point.
     """
     vector = end_mm - start_mm
     length = np.linalg.norm(vector, axis=-1, keepdims=True)
@@ -267,13 +267,13 @@ def arrows(start_mm: Array, end_mm: Array, head_mm: float) -> Array:
     return np.concatenate([np.stack([start_mm, end_mm], axis=1), strokes])
 
 
-def words(picture: LivePicture) -> Shapes:
-    """Draw all words in 3-D, for a page that cannot place them."""
+def draw_labels(picture: LivePicture) -> Shapes:
+    """Draw all labels in 3-D, for a page that cannot place them."""
     away, middle = 0.03 * picture.size_mm, picture.grid.bounds_mm.mean(axis=0)
     shapes: dict[str, SceneNode | None] = {}
     for number, label in enumerate((*axis_labels(picture), *point_labels(picture))):
-        way = label.at_mm - (middle if label.from_mm is None else label.from_mm)
-        out = away * way / max(float(np.linalg.norm(way)), 1e-9)
+        outward = label.at_mm - (middle if label.from_mm is None else label.from_mm)
+        out = away * outward / max(float(np.linalg.norm(outward)), 1e-9)
         at = label.at_mm + (5.0 if label.kind == "axis" else 1.0) * out
         looks = {"font_screen_scale": 0.8, "anchor": "center-center"}
         follows = {"text": label.text, "position": at * SCENE_PER_MM}

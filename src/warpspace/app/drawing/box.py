@@ -1,4 +1,4 @@
-"""The bent box: coloured surface, grid lines and edges on it, and the nominal box around it."""
+"""Drawing of the deformed box: coloured surface, grid lines and edges, and the nominal box."""
 
 import json
 from base64 import b64encode
@@ -34,11 +34,11 @@ from warpspace.picture.map_mesh import (
 from warpspace.units import Array
 
 SURFACE = "/box/surface"
-FADED = 0.85  # part of grey in a colour that fades
+FADED = 0.85  # share of grey in a faded colour
 DASH, GAP = 0.022, 0.014
-"""Dash and gap of the nominal box, as parts of the longest edge."""
+"""Dash and gap of the nominal box, relative to its longest edge."""
 ISOLINES: tuple[Rgb, Rgb] = ((226, 230, 236), (60, 68, 80))
-"""Seen on every colour of a scale: of one from a dark end up, and of a diverging one."""
+"""Contrast with all colours of a sequential scale, and of a diverging one."""
 
 
 def ghost_dashes(picture: LivePicture) -> Array:
@@ -49,10 +49,9 @@ def ghost_dashes(picture: LivePicture) -> Array:
 
 
 def surface(picture: LivePicture) -> SceneNode:
-    """Draw the coloured map of a picture, or its lines alone."""
-    has_lines, alone = picture.state.look.surface == "grid", picture.state.part.is_empty
-    # lines of the grid would stand before a part
-    mesh = line_mesh(picture, grid=alone) if has_lines else map_mesh(picture)
+    has_lines, without_part = picture.state.look.surface == "grid", picture.state.part.is_empty
+    # grid lines would hide a part
+    mesh = line_mesh(picture, grid=without_part) if has_lines else map_mesh(picture)
     drawn = mesh.vertices_mm, mesh.triangles, mesh.values
     return coloured_shape(*drawn, picture.scale, mesh.faded)
 
@@ -64,9 +63,9 @@ def coloured_shape(
     scale: ColourScale,
     faded: NDArray[np.bool_] | None = None,
 ) -> SceneNode:
-    """Give a surface or lines, points in mm, in the colours of the values at their points.
+    """Draw a surface or lines, points in mm, coloured by the values at the points.
 
-    Where they fade they are nearly the grey of the ghost.
+    Faded colours are close to the grey of the nominal box.
     """
     colours = level_colours(diverging=scale.diverging)[colour_levels(scale, values)]
     if faded is not None:
@@ -77,25 +76,25 @@ def coloured_shape(
 
 
 def box(picture: LivePicture) -> Shapes:
-    look, shown = picture.state.look, picture.state.shown
+    look, options = picture.state.look, picture.state.shown
     shapes: dict[str, SceneNode | None] = {SURFACE: surface(picture)}
     if look.surface != "grid":
         shapes["/box/edges"] = lines(edge_pieces(picture), colour(picture, "edge"), 1.8)
-        if shown.grid_lines:
+        if options.grid_lines:
             shapes["/box/grid"] = lines(grid_pieces(picture), colour(picture, "grid"), 0.7)
         if look.isolines or look.pass_fail:
-            seen = ISOLINES[picture.scale.diverging]
-            shapes["/box/isolines"] = lines(isoline_pieces(picture), seen, 1.4)
-    if shown.ghost:
+            rgb = ISOLINES[picture.scale.diverging]
+            shapes["/box/isolines"] = lines(isoline_pieces(picture), rgb, 1.4)
+    if options.ghost:
         shapes["/ghost"] = lines(ghost_dashes(picture), colour(picture, "ghost"), 1.5)
     return shapes
 
 
 class BoxLayer:
-    """The box as it is drawn.
+    """The box in the drawing.
 
-    While only errors change, points and colours alone are sent (`browser/mesh.js`); what viser
-    holds follows with `rest`.
+    While only errors change, only points and colours are sent (`browser/mesh.js`); the
+    nodes of viser are updated by `synchronise`.
     """
 
     def __init__(self, scene: SceneApi, page: Page, picture: LivePicture) -> None:
@@ -120,23 +119,22 @@ class BoxLayer:
         )
         self._behind = True
 
-    def rest(self, picture: LivePicture) -> None:
-        """Have viser hold what is drawn."""
+    def synchronise(self, picture: LivePicture) -> None:
         if self._behind:
             self._show_all(picture)
 
     def _show_all(self, picture: LivePicture) -> None:
-        self._full, self._behind = picture, False  # what viser holds
+        self._full, self._behind = picture, False  # of viser's nodes
         self._nodes.draw(box(picture))
 
 
-def only_bent(held: LivePicture, picture: LivePicture) -> bool:
-    """Tell whether pictures differ in points and colours of the surface alone."""
-    before, after = held.state, picture.state
+def only_bent(drawn: LivePicture, picture: LivePicture) -> bool:
+    """Return whether pictures differ in points and colours of the surface only."""
+    before, after = drawn.state, picture.state
     return (
-        not (picture.slices or held.slices or is_thin(picture.shape))
-        and picture.compared is None and held.compared is None
-        and picture.grid.nominal_mm is held.grid.nominal_mm
+        not (picture.slices or drawn.slices or is_thin(picture.shape))
+        and picture.compared is None and drawn.compared is None
+        and picture.grid.nominal_mm is drawn.grid.nominal_mm
         and after.look == before.look and after.shown == before.shown
         and not after.look.isolines and not after.look.pass_fail and picture.faded is None
         and after.look.surface in ("surface", "cut")
@@ -144,7 +142,7 @@ def only_bent(held: LivePicture, picture: LivePicture) -> bool:
 
 
 def line_facts(picture: LivePicture, vertices_mm: Array) -> dict[str, object]:
-    """Say which points the lines of a box end at, how far they are lifted: for `mesh.js`."""
+    """Return the end points of the lines of a box, and their lifts, for `mesh.js`."""
     of = map_parts(picture)[0].drawn_of
     number = np.zeros(of.surface.nodes.max() + 1, "<u4")
     number[of.surface.nodes] = np.arange(len(of.surface.nodes))

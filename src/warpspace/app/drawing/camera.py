@@ -1,4 +1,4 @@
-"""The camera of a tab: seen from the operator's side, so that what is drawn fills its room."""
+"""The camera of a tab: from the operator's side, so that the drawing fills its space."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,16 +18,16 @@ from warpspace.units import Array
 
 TOP_PX = 46  # height of the bar at the top; the style sheet has it too
 PHONE_PX, COLUMNS_PX = 700, 558  # width of a phone at most, and of both columns elsewhere
-PHONE_SHARE = 0.52  # of a phone's height, that the drawing has
+PHONE_SHARE = 0.52  # of the drawing, of a phone's height
 MOST_PX = 16_384
 LEAST_PX = 120
 LONGEST_WORD = 100
 HEADING_PX, FOOT_PX, LEGEND_PX = 66, 80, 134
-"""What heading, controls and colour bar take, until the page has said so."""
+"""Sizes of heading, controls and colour bar, until the page reports them."""
 WORDS_PX, PHONE_WORDS_PX = 46, 22
-"""Kept free at the sides, for the words at axes and corners."""
+"""Margins for the labels at axes and corners."""
 MOST_SHARE, LEAST_SHARE = 0.4, 0.3
-"""Parts that what is written keeps free at most, and that the drawing has at least."""
+"""Largest share of a margin, and smallest share of the drawing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,16 +46,15 @@ class Room:
 
     @property
     def margins(self) -> tuple[float, float, float, float]:
-        """Parts of width and height that are kept free: left, right, top, bottom."""
-        words = WORDS_PX if self.width > PHONE_PX else PHONE_WORDS_PX
-        right = min((self.right + words / 2.0) / self.width, MOST_SHARE)
-        top = min((self.top + words / 2.0) / self.height, MOST_SHARE)
-        bottom = min((self.bottom + words / 2.0) / self.height, 1.0 - LEAST_SHARE - top)
-        return min(words / self.width, MOST_SHARE), right, top, bottom
+        """Margins relative to width and height: left, right, top, bottom."""
+        label_px = WORDS_PX if self.width > PHONE_PX else PHONE_WORDS_PX
+        right = min((self.right + label_px / 2.0) / self.width, MOST_SHARE)
+        top = min((self.top + label_px / 2.0) / self.height, MOST_SHARE)
+        bottom = min((self.bottom + label_px / 2.0) / self.height, 1.0 - LEAST_SHARE - top)
+        return min(label_px / self.width, MOST_SHARE), right, top, bottom
 
 
 def first_room(page_width: float, page_height: float) -> Room:
-    """Guess it, until the page has said it."""
     phone = page_width <= PHONE_PX
     width = page_width - (0 if phone else COLUMNS_PX)
     height = page_height * (PHONE_SHARE if phone else 1.0) - TOP_PX
@@ -63,11 +62,11 @@ def first_room(page_width: float, page_height: float) -> Room:
 
 
 def read_room(text: str) -> Room | None:
-    """Read what a page says of its room; None where it says nothing that can be."""
-    words = text[:LONGEST_WORD].split(",")
-    if len(words) != 6 or not all(word.isascii() and word.isdigit() for word in words):
+    """Parse the size reported by a page; None where it is invalid."""
+    fields = text[:LONGEST_WORD].split(",")
+    if len(fields) != 6 or not all(word.isascii() and word.isdigit() for word in fields):
         return None
-    width, height, top, bottom, right = (float(word[:6]) for word in words[1:])
+    width, height, top, bottom, right = (float(word[:6]) for word in fields[1:])
     if not (LEAST_PX <= width <= MOST_PX and LEAST_PX <= height <= MOST_PX):
         return None
     return Room(width, height, top, bottom, right)
@@ -75,24 +74,24 @@ def read_room(text: str) -> Room | None:
 
 # --- The camera -----------------------------------------------------------------------------------
 
-FOV_DEG = 22.0  # vertical field of view: long enough that parallel edges look parallel
-TELEPHOTO_DEG = 3.0  # stands in for an orthographic camera, which viser has not
+FOV_DEG = 22.0  # vertical field of view: small enough that parallel edges look parallel
+TELEPHOTO_DEG = 3.0  # approximates an orthographic camera, which viser lacks
 MARGIN = 1.06
 NEAR, FAR = 0.01, 1000.0
-"""Clipping planes of the usual camera, scene units."""
+"""Clipping planes of the default camera, scene units."""
 STEEPEST = 1e-3
-"""How far the view from above leans to the front: exactly above, an orbiting camera has no up."""
+"""Tilt of the view from above: exactly vertical, an orbiting camera has no up direction."""
 VIEWS: Mapping[str, Direction] = {**model.VIEWS, "top": (0.0, -STEEPEST, 1.0)}
-"""From what is looked at towards the camera."""
+"""Directions from the target towards the camera."""
 MOVED = 1e-3
-"""How far from where it was put, as a part of its distance, a camera has been moved by hand."""
+"""Smallest movement of a camera by hand, relative to its distance."""
 _ROUNDS = 8
 Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class CameraMemory:
-    """Where a camera stands, in units of the drawing."""
+    """Pose of a camera, in units of the drawing."""
 
     position: Vector
     look_at: Vector
@@ -100,10 +99,9 @@ class CameraMemory:
     fov_rad: float
 
     def is_near(self, other: "CameraMemory") -> bool:
-        """Tell whether nobody has moved it from there by hand."""
         least = MOVED * float(np.linalg.norm(np.subtract(self.position, self.look_at)))
-        one, two = ((*at.position, *at.look_at, at.fov_rad) for at in (self, other))
-        return np.allclose(one, two, rtol=0.0, atol=least)
+        first, second = ((*at.position, *at.look_at, at.fov_rad) for at in (self, other))
+        return np.allclose(first, second, rtol=0.0, atol=least)
 
 
 def fit_camera(
@@ -113,56 +111,56 @@ def fit_camera(
     fov_deg: float = FOV_DEG,
     margins: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
 ) -> CameraMemory:
-    """Place a camera so that points fill the picture but its margins: left, right, top, bottom."""
+    """Place a camera so that points fill the picture inside margins: left, right, top, bottom."""
     flat = points_mm.reshape(-1, 3) * SCENE_PER_MM
-    back = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
-    right = np.cross((0.0, 0.0, 1.0), back)
+    backward = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
+    right = np.cross((0.0, 0.0, 1.0), backward)
     right = right / np.linalg.norm(right)
-    up = np.cross(back, right)
+    up = np.cross(backward, right)
     half = np.tan(np.deg2rad(fov_deg) / 2.0) * np.array([max(aspect, 0.1), 1.0])
     before, after = np.array([margins[0], margins[3]]), np.array([margins[1], margins[2]])
-    # middle and half size of what is to be filled
+    # middle and half size of the area to fill
     middle, free = (before - after) * half, (1.0 - before - after) * half / MARGIN
     target, distance = (flat.min(axis=0) + flat.max(axis=0)) / 2.0, 1.0
     offset = np.zeros(2)
     for _ in range(_ROUNDS):
-        seen = (flat - target) @ np.stack([right, up, back], axis=1)
-        across, towards = seen[:, :2], seen[:, 2]
+        in_view = (flat - target) @ np.stack([right, up, backward], axis=1)
+        across, towards = in_view[:, :2], in_view[:, 2]
         from_middle = np.abs(across - offset + towards[:, None] * middle)
         distance = float(((from_middle / free).max(axis=1) + towards).max())
         at = across / (distance - towards)[:, None]
         shift = (at.min(axis=0) + at.max(axis=0)) / 2.0 - middle
         offset = middle * distance
         target = target + distance * (shift[0] * right + shift[1] * up)
-    position, look_at = (target + distance * back).tolist(), target.tolist()
+    position, look_at = (target + distance * backward).tolist(), target.tolist()
     return CameraMemory(tuple(position), tuple(look_at), (0.0, 0.0, 1.0), np.deg2rad(fov_deg))
 
 
 def clipping(position: Array, points: Array, *, orthographic: bool) -> tuple[float, float]:
-    """Choose near and far planes, as distances from a camera."""
     distance = float(np.linalg.norm(position - points.reshape(-1, 3), axis=-1).max())
     return (0.02 * distance if orthographic else NEAR), max(FAR, 5.0 * distance)
 
 
 def focus(state: AppState) -> tuple[object, ...]:
-    """Tell what the camera is set up for: the scene, its axes, whether its machine is shown."""
+    """Return the properties that require a new camera: scene, chain, display of the machine."""
     return Identity(state.origin), state.scene.machine.chain, state.machine.shown
 
 
 class TabCamera:
-    """The camera of a tab: put where all of the box is seen, remembered, put back."""
+    """The camera of a tab, which shows the whole box or a stored view."""
 
     def __init__(self, client: ClientHandle) -> None:
         self._camera = client.camera
         self.wanted: CameraMemory | None = None
-        self.view, self.orthographic = "iso", False  # chosen last: a key of `VIEWS`, the telephoto
-        self._told: Room | None = None
-        self._puts: tuple[CameraMemory, ...] = ()  # of late: a page may still tell the one before
+        self.view, self.orthographic = "iso", False  # a key of `VIEWS`, the telephoto lens
+        self.reported_room: Room | None = None
+        # the latest ones, since a page may report an earlier one
+        self._placements: tuple[CameraMemory, ...] = ()
 
     def choose(
         self, picture: LivePicture, view: str | None = None, lens: bool | None = None
     ) -> None:
-        """Take a named view, or another lens from where the camera stands."""
+        """Select a named view, or another lens at the present position."""
         before, self.view = self.orthographic, view or self.view
         self.orthographic = before if lens is None else lens
         if view is not None or lens is None:
@@ -192,18 +190,17 @@ class TabCamera:
 
     @property
     def room(self) -> Room:
-        """The room of the drawing: as the page has said, until then as its panels will leave it."""
         camera = self._camera
-        return self._told or first_room(camera.image_width, camera.image_height)
+        return self.reported_room or first_room(camera.image_width, camera.image_height)
 
     def take_room(self, room: Room, picture: LivePicture | None) -> None:
-        """Take note of the drawing's room; a camera that nobody has moved fills it again."""
-        self._told, now = room, self.remember()
-        if picture is not None and any(put.is_near(now) for put in self._puts):
+        """Record the size of the drawing; a camera that was not moved by hand fits it again."""
+        self.reported_room, now = room, self.remember()
+        if picture is not None and any(put.is_near(now) for put in self._placements):
             self.fit(picture)
 
     def place(self, picture: LivePicture) -> None:
-        """Put it where it is wanted, else where all of the box is seen."""
+        """Move to the wanted view, else to one of the whole box."""
         memory, self.wanted = self.wanted, None
         if memory is None:
             self.fit(picture)
@@ -212,21 +209,20 @@ class TabCamera:
             self._stand_at(memory)
 
     def expect(self, memory: CameraMemory) -> None:
-        """Get ready for a place that the page itself moves to."""
+        """Prepare for a view that the page itself moves to."""
         telephoto = memory.fov_rad < np.deg2rad(2.0 * TELEPHOTO_DEG)
-        self.orthographic, self._puts = bool(telephoto), ()
+        self.orthographic, self._placements = bool(telephoto), ()
         self._clip(memory, np.array([memory.look_at]) / SCENE_PER_MM)
 
     def fit(self, picture: LivePicture) -> None:
-        """Fill the room between the panels with the box, its traces and axes."""
         points, room = self._room_mm(picture), self.room
-        found = fit_camera(
+        fitted = fit_camera(
             points, room.aspect, VIEWS[self.view], self._fov_deg, margins=room.margins
         )
         before = self.remember()
-        self._clip(found, points)
-        self._stand_at(found)
-        self._puts = (*self._puts[-1:], before, self.remember())
+        self._clip(fitted, points)
+        self._stand_at(fitted)
+        self._placements = (*self._placements[-1:], before, self.remember())
 
     def remember(self) -> CameraMemory:
         camera = self._camera
@@ -246,4 +242,4 @@ class TabCamera:
         camera = self._camera
         camera.up_direction, camera.fov = place.up, place.fov_rad
         camera.position = place.position
-        camera.look_at = place.look_at  # since setting the position moves it
+        camera.look_at = place.look_at  # changed by the assignment of the position

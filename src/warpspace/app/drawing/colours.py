@@ -1,8 +1,8 @@
-"""Colours of what is drawn, so that they arrive on screen as they were meant.
+"""Colours of the drawing, corrected for the tone mapping of viser's client.
 
-viser's client tone-maps what it draws (three.js, ACES filmic). For unlit materials the curve can be
-inverted: vertices get the colour that the tone map turns into the wanted one. Some components come
-out below 0 or above 1, so they travel as floats.
+The client applies the ACES filmic tone map (three.js). For unlit materials it can be inverted:
+vertices get the colour that the tone map turns into the target colour. Some components are below 0
+or above 1, so they are sent as floats.
 """
 
 from collections.abc import Mapping
@@ -37,17 +37,17 @@ _C, _D, _E = 0.983729, 0.4329510, 0.238081
 
 
 def inverse_tone_map(srgb: NDArray[np.uint8]) -> Floats:
-    """Find the linear colours that the client turns into given ones."""
-    wanted = srgb_to_linear(srgb.astype(float) / 255.0) @ np.linalg.inv(_OUT).T
-    # wanted = (v² + A·v − B) / (C·v² + D·v + E), solved for the positive v
-    a, b, c = 1.0 - _C * wanted, _A - _D * wanted, -(_B + _E * wanted)
+    """Compute the linear colours that the client maps to sRGB colours."""
+    target = srgb_to_linear(srgb.astype(float) / 255.0) @ np.linalg.inv(_OUT).T
+    # target = (v² + A·v − B) / (C·v² + D·v + E), solved for the positive v
+    a, b, c = 1.0 - _C * target, _A - _D * target, -(_B + _E * target)
     v = (-b + np.sqrt(b * b - 4.0 * a * c)) / (2.0 * a)
     return ((v / _EXPOSURE) @ np.linalg.inv(_IN).T).astype(np.float32)
 
 
 @cache
 def level_colours(*, diverging: bool) -> Floats:
-    """Give the vertex colours of all levels of a scale, [LEVELS, 3]."""
+    """Return the vertex colours of all levels of a scale, [LEVELS, 3]."""
     return inverse_tone_map(colour_table(diverging=diverging))
 
 
@@ -57,14 +57,14 @@ def colour_levels(scale: ColourScale, values: Array) -> NDArray[np.uint8]:
 
 @lru_cache(maxsize=64)
 def line_colour(rgb: Rgb) -> NDArray[np.uint8]:
-    """Give the bytes for a line that is to arrive in a colour, [3]; near exact below 230."""
+    """Return the bytes of a line that appears in a colour, [3]; nearly exact below 230."""
     linear = np.clip(inverse_tone_map(np.array(rgb, dtype=np.uint8)), 0.0, 1.0)
-    found = np.rint(linear_to_srgb(linear.astype(float)) * 255.0).astype(np.uint8)
-    found.flags.writeable = False  # the same array each time
-    return found
+    rgb_bytes = np.rint(linear_to_srgb(linear.astype(float)) * 255.0).astype(np.uint8)
+    rgb_bytes.flags.writeable = False  # the same array each time
+    return rgb_bytes
 
 
-# --- Colours of lines, on a light ground and on a dark one ----------------------------------------
+# --- Colours of lines, on a light and on a dark background ----------------------------------------
 
 
 COLOURS: Mapping[str, tuple[Rgb, Rgb]] = {
@@ -72,7 +72,7 @@ COLOURS: Mapping[str, tuple[Rgb, Rgb]] = {
     "grid": ((24, 32, 46), (20, 24, 32)),
     "ghost": ((140, 150, 165), (130, 138, 150)),
     "trace_nominal": ((130, 139, 153), (150, 158, 170)),
-    "trace_actual": ((206, 84, 8), (224, 142, 62)),  # only it stands out
+    "trace_actual": ((206, 84, 8), (224, 142, 62)),  # the only accent
     "trace_elsewhere": ((196, 202, 211), (84, 92, 104)),
     "axis": ((110, 120, 135), (150, 158, 170)),
     "body_edge": ((70, 78, 90), (150, 158, 170)),

@@ -1,4 +1,4 @@
-"""Words beside points of the drawing: axes and their numbers, worst point, corners, names.
+"""Labels of points of the drawing: axes and their numbers, worst point, corners, names.
 
 The page places them as the camera moves (`browser/overlay.js`); an offline page has them in 3-D.
 """
@@ -11,7 +11,7 @@ import numpy as np
 
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import chosen_trace, drawn_bodies, tool_point
-from warpspace.app.evaluation.point_explanation import answer, drawn_places, measured
+from warpspace.app.evaluation.point_explanation import drawn_places, explain_point, measure_distance
 from warpspace.app.state.app_state import Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.field.grid import Grid
@@ -29,7 +29,7 @@ from warpspace.picture.formatting import (
 from warpspace.units import MICROMETRE, MINUS, MM_PER_UM, Array
 
 AWAY = 0.13
-"""Distance of the axes from the nominal box, as a part of the longest edge: the bend has room."""
+"""Distance of the axes from the nominal box, relative to its longest edge."""
 TICK = 0.022
 MAX_TICKS = 6
 LEVER_AT = 0.25  # place of the lever's label between point and frame
@@ -37,173 +37,175 @@ LEVER_AT = 0.25  # place of the lever's label between point and frame
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """Words, and the point that they belong to."""
+    """A text at a point."""
 
     text: str
     at_mm: Array
     # "tick", "axis" (its name), "worst", "corner", "asked", "measured", "name", "note"
     kind: str = "name"
-    from_mm: Array | None = None  # of axes: a point that the words stand away from
+    from_mm: Array | None = None  # of axes: the label is moved away from this point
     axis: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisLabels:
-    """An axis beside the nominal box, numbered in positions of the machine's axis along it."""
+    """An axis beside the nominal box, with positions of the machine axis along it."""
 
     name: str  # "X"; "x in R" where no linear axis of the machine runs along it
     ends_mm: Array  # [2, 3]
-    out: Array  # [3]; the way its ticks point
+    out: Array  # [3]; direction of its ticks
     ticks: tuple[tuple[str, Array], ...]  # number and place
 
 
 def axes(picture: LivePicture) -> tuple[AxisLabels, ...]:
-    """Lay out the axes: X along the front, Y along the right, Z up the left of the front."""
+    """Build the axes: X along the front, Y along the right, Z up the left of the front."""
     return _axes(Identity(picture.grid), AWAY * picture.size_mm)
 
 
 @lru_cache(maxsize=32)
 def _axes(of: Identity, away: float) -> tuple[AxisLabels, ...]:
-    grid: Grid = of.thing
+    grid: Grid = of.target
     low, high = grid.bounds_mm
     frames = (
         (np.array([0.0, low[1] - away, low[2]]), np.array([0.0, -1.0, 0.0])),
         (np.array([high[0] + away, 0.0, low[2]]), np.array([1.0, 0.0, 0.0])),
         (np.array([low[0] - away, low[1], 0.0]), np.array([-1.0, 0.0, 0.0])),
     )
-    found: list[AxisLabels] = []
+    labels: list[AxisLabels] = []
     for k, (foot, out) in enumerate(frames):
-        along, name, way, shift = np.eye(3)[k], grid.axes[k], 1.0, 0.0
+        along, name, sign, shift = np.eye(3)[k], grid.axes[k], 1.0, 0.0
         if name and is_linear(name):
-            # position of the axis = way × (place in R) + shift
-            way = float(grid.directions[k])
-            start = float(low[k] if way > 0.0 else high[k])
-            shift = float(np.min(grid.coordinates[name])) - way * start
+            # position of the axis = sign × (place in R) + shift
+            sign = float(grid.directions[k])
+            start = float(low[k] if sign > 0.0 else high[k])
+            shift = float(np.min(grid.coordinates[name])) - sign * start
         else:
             name = f"{'xyz'[k]} in R"
-        first, last = sorted((way * float(low[k]) + shift, way * float(high[k]) + shift))
+        first, last = sorted((sign * float(low[k]) + shift, sign * float(high[k]) + shift))
         ticks = tuple(
-            (spell_coordinate(value), foot + way * (value - shift) * along)
+            (spell_coordinate(value), foot + sign * (value - shift) * along)
             for value in tick_values(first, last, MAX_TICKS)
         )
-        found.append(
+        labels.append(
             AxisLabels(name, np.stack([foot + low[k] * along, foot + high[k] * along]), out, ticks)
         )
-    return tuple(found)
+    return tuple(labels)
 
 
 def axes_room_mm(picture: LivePicture) -> Array:
-    """Give points around the nominal box that leave room for axes and traces, [n, 3], mm."""
     low, high = picture.grid.bounds_mm
     away = (AWAY + TICK) * picture.size_mm
     x, y, z = (low[0] - away, high[0] + away), (low[1] - away, high[1]), (low[2], high[2])
     room = [np.stack(np.meshgrid(x, y, z), axis=-1)]
     if is_thin(picture.shape):
-        # what there is to see of a machine with one linear axis or none are its traces
+        # a machine with at most one linear axis shows traces only
         room += [at for of in picture.traces for at in (of.nominal_mm, of.actual_mm)]
     return np.concatenate([points.reshape(-1, 3) for points in room])
 
 
 def axis_labels(picture: LivePicture) -> list[Label]:
     state = picture.state
-    if not state.shown.axes or state.machine.shown:  # their numbers would cover the machine
+    if not state.shown.axes or state.machine.shown:  # numbers would cover the machine
         return []
     return _axis_labels(axes(picture), TICK * picture.size_mm)
 
 
 @lru_cache(maxsize=32)
 def _axis_labels(of: tuple[AxisLabels, ...], tick: float) -> list[Label]:
-    found: list[Label] = []
+    labels: list[Label] = []
     for k, axis in enumerate(of):
-        found += [Label(text, at + tick * axis.out, "tick", at, k) for text, at in axis.ticks]
+        labels += [Label(text, at + tick * axis.out, "tick", at, k) for text, at in axis.ticks]
         middle = axis.ends_mm.mean(axis=0)
-        found.append(Label(f"{axis.name} [mm]", middle + tick * axis.out, "axis", middle, k))
-    return found
+        labels.append(Label(f"{axis.name} [mm]", middle + tick * axis.out, "axis", middle, k))
+    return labels
 
 
 def _spell(value: float, unit: str = MICROMETRE, plus_minus: str = "") -> str:
-    """Spell an error: ``23.6 µm``, ``23.6 ± 1.2 µm``, from 10 mm up ``12.3 mm``."""
+    """Format an error: ``23.6 µm``, ``23.6 ± 1.2 µm``, from 10 mm up ``12.3 mm``."""
     if unit == MICROMETRE and abs(value) >= 1e4:
         value, unit, plus_minus = value * MM_PER_UM, "mm", ""
     return f"{value:.1f}{plus_minus} {unit}".replace("-", MINUS)
 
 
 def point_labels(picture: LivePicture) -> list[Label]:
-    """Give what is written beside points of the volume, what matters most first."""
-    worst, asked = [*_worst(picture)], [*_asked(picture)]
-    for one, other in zip(worst, asked, strict=False):
-        apart = np.linalg.norm(one.at_mm - other.at_mm)
-        if apart < TICK * picture.size_mm and other.text.startswith(one.text.removeprefix("max ")):
-            worst = []  # one place, said once
-    return [*worst, *asked, *_measured(picture), *_names(picture), *_corners(picture)]
+    """List the labels of points of the volume, by priority."""
+    worst, point = [*_worst(picture)], [*_point(picture)]
+    for label, other in zip(worst, point, strict=False):
+        distance = np.linalg.norm(label.at_mm - other.at_mm)
+        same_text = other.text.startswith(label.text.removeprefix("max "))
+        if same_text and distance < TICK * picture.size_mm:
+            worst = []
+    return [*worst, *point, *_measured(picture), *_names(picture), *_corners(picture)]
 
 
 def _worst(picture: LivePicture) -> Iterator[Label]:
     worst = picture.worst_node
     value = float(picture.values.flat[worst])
     if picture.state.look.worst and value != 0.0:
-        sure = ""
+        plus_minus = ""
         if picture.uncertainty is not None and picture.quantity == "position":
-            sure = u95_behind(None if picture.u95_um is None else picture.u95_um.item(worst))
-        text = f"max {_spell(value, picture.scale.unit, sure)}"
+            plus_minus = u95_behind(None if picture.u95_um is None else picture.u95_um.item(worst))
+        text = f"max {_spell(value, picture.scale.unit, plus_minus)}"
         yield Label(text, picture.drawn_mm.reshape(-1, 3)[worst], "worst")
 
 
 def _corners(picture: LivePicture) -> Iterator[Label]:
-    look, found = picture.state.look, picture.uncertainty
-    if not look.arrows and not (look.ellipsoids and found):
+    look, uncertainty = picture.state.look, picture.uncertainty
+    if not look.arrows and not (look.ellipsoids and uncertainty):
         return
     is_length = picture.quantity == "position" and picture.component == "norm"
     for node in corners(picture.shape):
         if not (look.worst and is_length and node == picture.worst_node):
-            sure = length_words(found, int(node))
-            text = _spell(float(picture.field.norm_um.flat[node]), plus_minus=sure)
+            plus_minus = length_words(uncertainty, int(node))
+            text = _spell(float(picture.field.norm_um.flat[node]), plus_minus=plus_minus)
             yield Label(text, picture.drawn_mm.reshape(-1, 3)[node], "corner")
 
 
-def _asked(picture: LivePicture) -> Iterator[Label]:
+def _point(picture: LivePicture) -> Iterator[Label]:
     picked, state = picture.state.picked, picture.drawn_state
     if picked is None or picture.is_difference:
         return
-    found = answer(state, picked, picture.exaggeration)
-    length = float(np.linalg.norm(found.drawn_um))
-    where = list_axes(point_axes(state.scene, found.at))
-    words = f"{length:.1f}{length_words(found.uncertainty)} µm at {where}"
-    yield Label(words, found.drawn_mm, "asked")
-    for part in found.explanation.contributions:
+    explained = explain_point(state, picked, picture.exaggeration)
+    length = float(np.linalg.norm(explained.drawn_um))
+    where = list_axes(point_axes(state.scene, explained.at))
+    text = f"{length:.1f}{length_words(explained.uncertainty)} µm at {where}"
+    yield Label(text, explained.drawn_mm, "asked")
+    for part in explained.explanation.contributions:
         if part.key != picture.state.lever:
             continue
-        point = found.explanation.nominal_mm + found.shift_mm
-        origin = part.origin_mm + found.shift_mm
-        way = "about" if parameter(part.key).is_rotation else "along"
-        yield Label(f"{part.key} {way} this axis", origin, "asked")
+        point = explained.explanation.nominal_mm + explained.shift_mm
+        origin = part.origin_mm + explained.shift_mm
+        relation = "about" if parameter(part.key).is_rotation else "along"
+        yield Label(f"{part.key} {relation} this axis", origin, "asked")
         lever = float(np.linalg.norm(part.lever_mm))
         yield Label(f"lever {lever:.0f} mm", point + LEVER_AT * (origin - point), "asked")
 
 
 def _measured(picture: LivePicture) -> Iterator[Label]:
-    if (drawn := measured(picture)) is not None:
-        found, _, (start, end, *corner) = drawn
+    measurement= measure_distance(picture)
+    if measurement is None:
+        return
+    distance, _, (start, end, *corner) = measurement
         places = (*[(start + end) / 2.0] * 2, *corner)
-        for words, at in zip(found.lines(), places, strict=True):
-            yield Label(words, at, "measured")
+        for text, at in zip(distance.lines(), places, strict=True):
+            yield Label(text, at, "measured")
 
 
 def _names(picture: LivePicture) -> Iterator[Label]:
-    state, found = picture.state, picture.bench
-    if found is not None:
-        ends = found.drawn_mm(picture.exaggeration)[np.unique(found.at)]
-        largest = np.linalg.norm(found.error_um[np.unique(found.at)], axis=-1).max()
-        words = f"{found.of.title}: max {_spell(float(largest))}"
+    state, overlay = picture.state, picture.bench
+    if overlay is not None:
+        ends = overlay.drawn_mm(picture.exaggeration)[np.unique(overlay.at)]
+        largest = np.linalg.norm(overlay.error_um[np.unique(overlay.at)], axis=-1).max()
+        text = f"{overlay.of.title}: max {_spell(float(largest))}"
         factor = spell_factor(picture.exaggeration)
-        yield Label(f"{words}, drawn {factor}", ends[np.argmax(ends[:, 2])])
+        yield Label(f"{text}, drawn {factor}", ends[np.argmax(ends[:, 2])])
     moved = picture.moved_traces
     name = chosen_trace(picture)
     if name:
         lengths = np.linalg.norm(moved[name].error_um, axis=-1)
         worst = int(np.argmax(lengths))
-        words = f"{name}: max {_spell(float(lengths[worst]))}"
-        yield Label(words, moved[name].actual_mm[worst])
+        text = f"{name}: max {_spell(float(lengths[worst]))}"
+        yield Label(text, moved[name].actual_mm[worst])
     if state.machine.shown:
         drawn_mm, error_um = tool_point(picture)
         length = float(np.linalg.norm(error_um))
@@ -211,20 +213,25 @@ def _names(picture: LivePicture) -> Iterator[Label]:
 
 
 def note_labels(picture: LivePicture) -> list[Label]:
-    """Give the flags of review notes: their numbers, where what they are about is drawn now."""
+    """List the flags of review notes: their numbers, at the present places in the drawing."""
     if picture.is_difference or not picture.state.review:
         return []
-    state, own = picture.drawn_state, dict[str, Mapping[str, float]]()
+    state, factor = picture.drawn_state, picture.exaggeration
     bodies = drawn_bodies(picture) if picture.state.machine.shown else ()
-    found: list[Label] = []
+    places: dict[str, Array] = {}
+    surface_points: dict[str, Mapping[str, float]] = {}  # evaluated together
     for number, note in enumerate(picture.state.review, 1):
-        words, picked = f"⚑ {number}", Picked.of_note(note)
+        text, picked = f"⚑ {number}", Picked.of_note(note)
         if picked and picked.point_mm:
-            found.append(Label(words, answer(state, picked, picture.exaggeration).drawn_mm, "note"))
+            places[text] = explain_point(state, picked, factor).drawn_mm
         elif picked:
-            own[words] = picked.at
-        elif own_mm := [b.vertices_mm for b in bodies if note.on and b.body.frame == note.on.body]:
-            points = np.concatenate(own_mm)
-            found.append(Label(words, (points.min(axis=0) + points.max(axis=0)) / 2.0, "note"))
-    places = drawn_places(state, [*own.values()], picture.exaggeration) if own else ()
-    return [*found, *(Label(words, at, "note") for words, at in zip(own, places, strict=True))]
+            surface_points[text] = picked.at
+        elif note.on:
+            vertices = [part.vertices_mm for part in bodies if part.body.frame == note.on.body]
+            if vertices:
+                points = np.concatenate(vertices)
+                places[text] = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    if surface_points:
+        drawn_mm = drawn_places(state, [*surface_points.values()], factor)
+        places |= zip(surface_points, drawn_mm, strict=True)
+    return [Label(text, at, "note") for text, at in places.items()]

@@ -1,4 +1,4 @@
-"""Everything around the box as one layer: the schematic machine, and the table that turns."""
+"""The layer around the box: surroundings, machine, and the rotating table."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -9,7 +9,7 @@ from viser import ClientHandle
 from viser.transforms import SO3
 
 from warpspace.app.browser.page import Page
-from warpspace.app.drawing.around import GIZMO, around, turned_points
+from warpspace.app.drawing.around import GIZMO, draw_surroundings, turned_points
 from warpspace.app.drawing.colours import Rgb, colour
 from warpspace.app.drawing.shapes import SCENE_PER_MM, Nodes, SceneNode, Shapes, ball, lines, mesh
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -19,34 +19,33 @@ from warpspace.app.state.leaf import Identity
 from warpspace.bodies.placed import PlacedBody
 from warpspace.kinematics import transforms
 
-STEP_S = 0.125  # between two pictures of a turning table: modest, since each is sent to the page
-LONGEST_STEP_S = 0.5  # time lost is skipped, not made up for
+STEP_S = 0.125  # between two pictures of a rotating table; each is sent to the page
+LONGEST_STEP_S = 0.5  # longer delays are skipped
 SPEED_DEG_S = 30.0
 
-BALL = 0.010  # marker of the tool point, as a part of the longest edge
+BALL = 0.010  # marker of the tool point, relative to the longest edge
 OPACITY = 0.045
-GIZMO_SIZE = 0.3  # of what moves the part, as a part of the longest edge
+GIZMO_SIZE = 0.3  # relative to the longest edge
 
 
 def machine(picture: LivePicture, turned: Mapping[str, float]) -> Shapes:
-    """Draw the bodies, moved by the positions of the machine and bent by its errors.
+    """Draw the bodies at the positions of the machine, deformed by its errors.
 
-    Some axes may stand elsewhere, degrees, while one is turned; its table is then drawn also where
-    the machine is not.
+    `turned` overrides positions, degrees, during an animation; its table is then drawn also where
+    the machine is hidden.
     """
-    shown, shapes = picture.state.machine.shown, dict[str, SceneNode | None]()
-    if shown or turned:
+    is_shown, shapes = picture.state.machine.shown, dict[str, SceneNode | None]()
+    if is_shown or turned:
         edge = colour(picture, "body_edge")
         for part in drawn_bodies(picture, turned):
             shapes |= _body("/machine", part, part.body.colour, edge)
-    if shown:
+    if is_shown:
         at, size = tool_point(picture)[0], BALL * picture.size_mm
         shapes["/machine/tool_point"] = ball(at, size, colour(picture, "edge"))
     return shapes
 
 
 def ghost_machine(picture: LivePicture) -> Shapes:
-    """Draw the nominal machine, nearly transparent: it tells what the box is a part of."""
     rgb, edge = (colour(picture, name) for name in ("ghost_body", "ghost_body_edge"))
     shapes: dict[str, SceneNode | None] = {}
     for part in drawn_bodies(picture, nominal=True):
@@ -54,16 +53,16 @@ def ghost_machine(picture: LivePicture) -> Shapes:
     return shapes
 
 
-def _body(root: str, part: PlacedBody, rgb: Rgb, edge: Rgb, **more: object) -> Shapes:
+def _body(root: str, part: PlacedBody, rgb: Rgb, edge: Rgb, **options: object) -> Shapes:
     name, triangles = f"{root}/{part.body.name}", part.body.triangles
     return {
-        name: mesh(part.vertices_mm, triangles, rgb, flat_shading=True, **more),
+        name: mesh(part.vertices_mm, triangles, rgb, flat_shading=True, **options),
         f"{name}_edges": lines(part.edges_mm, edge, 0.9),
     }
 
 
 class MovingLayer:
-    """Everything around the box, which may also move by itself: the session turns it on."""
+    """Everything around the box, with an animation that the session advances."""
 
     def __init__(self, client: ClientHandle, page: Page, picture: LivePicture) -> None:
         self._client = client
@@ -71,22 +70,22 @@ class MovingLayer:
         self._around = Nodes(client.scene, page)
         self._ghost, self._turning = Nodes(client.scene), Nodes(client.scene)
         self._ghost_of: object = None
-        self.position: dict[str, float] = {}  # of the played axis, degrees; none where it stands
+        self.position: dict[str, float] = {}  # of the animated axis, degrees; empty while stopped
         self.moved: Callable[[], None] = lambda: None
-        self.clamp: Callable[[str], None] = lambda _place: None  # takes where the part is let go
+        self.clamp: Callable[[str], None] = lambda _place: None  # called after a drag
         self._turned_deg = 0.0
-        self._turned_at: float | None = None  # None while it stands still
+        self._turned_at: float | None = None  # None while stopped
         self.show(picture)
 
     def show(self, picture: LivePicture) -> None:
-        """Draw a picture; where the axis itself has been moved, the rotation starts there anew."""
+        """Draw a picture; a moved axis restarts the rotation at its new position."""
         before, self._picture = self._picture.state, picture
         now = picture.state
         same = before.origin is now.origin and before.scene.machine is now.scene.machine
         if not same or before.positions != now.positions:
             self._turned_at, self._turned_deg = None, 0.0
             self._stand({})
-        self._around.draw({**self._gizmo(picture), **around(picture)})
+        self._around.draw({**self._gizmo(picture), **draw_surroundings(picture)})
         self._draw_ghost(picture)
         self._draw_turning()
 
@@ -100,7 +99,7 @@ class MovingLayer:
         return {GIZMO: SceneNode("add_transform_controls", stays, follows, self._drag)}
 
     def _drag(self, event: Any) -> None:
-        """Clamp the part where it is let go; viser calls it in a thread of its own."""
+        """Place the part at the end of a drag; called by viser in a thread of its own."""
         if event.phase == "end" and self._picture.part is not None:
             part, turn = self._picture.part, np.asarray(SO3(event.target.wxyz).as_matrix(), float)
             at = transforms.rigid(turn, event.target.position / SCENE_PER_MM)
@@ -108,11 +107,10 @@ class MovingLayer:
             self.clamp(",".join(map(repr, place)))
 
     def _draw_ghost(self, picture: LivePicture) -> None:
-        """Errors do not move the ghost; it is not drawn beside the machine itself."""
         state = picture.state
         on = state.machine.ghost and not state.machine.shown
         of = on and (
-            Identity(state.scene), state.seen, state.shown.dark,
+            Identity(state.scene), state.view_key, state.shown.dark,
             Identity(state.machine.linear_mm), Identity(state.positions),
         )  # fmt: skip
         if of != self._ghost_of:
@@ -128,7 +126,7 @@ class MovingLayer:
         return self._turned_at is not None
 
     def play(self, on: bool | None) -> None:
-        """Play (True), pause (False), or go back to where the axis stands (None)."""
+        """Play (True), pause (False), or return to the position of the axis (None)."""
         if on:
             self._turned_at = time.monotonic()
             return
@@ -141,7 +139,7 @@ class MovingLayer:
 
     @property
     def wait_s(self) -> float | None:
-        """How long to wait until the table is turned on; None while it stands still."""
+        """Time until the next picture of the animation; None while stopped."""
         at = self._turned_at
         return None if at is None else max(0.0, at + STEP_S - time.monotonic())
 

@@ -1,4 +1,4 @@
-"""What is drawn in 3-D, as data: functions give shapes by name, `Nodes` keeps viser's scene so.
+"""Shapes of the drawing as data, and the nodes of viser's scene that follow them.
 
 All points are in mm and all nodes have a scale of `SCENE_PER_MM`: one scene unit is 100 mm, since
 viser clips beyond 1000 units.
@@ -19,7 +19,7 @@ from warpspace.units import Array
 
 SCENE_PER_MM = 0.01
 UNLIT = {"scale": SCENE_PER_MM, "cast_shadow": False, "receive_shadow": False}
-Pieces = NDArray[np.float32]  # [S, 2, 3], mm; ends of pieces of line
+Pieces = NDArray[np.float32]  # [S, 2, 3], mm; ends of line segments
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,23 +27,23 @@ class SceneNode:
     """One node of the scene."""
 
     add: str  # method of viser's scene that adds it
-    stays: Mapping[str, Any]  # another value adds it anew
-    follows: Mapping[str, Any]  # assigned in place; arrays are not changed afterwards
-    on_update: Callable[[Any], None] | None = None  # told what a user does with it
+    constant: Mapping[str, Any]  # a change adds the node again
+    assigned: Mapping[str, Any]  # assigned in place; arrays are not changed afterwards
+    on_update: Callable[[Any], None] | None = None  # callback for user events
 
 
 Shapes = Mapping[str, SceneNode | None]
 
 
 class Nodes:
-    """Nodes of a scene, by name: added when first drawn, then changed in place or hidden."""
+    """Nodes of viser's scene, by name: added once, then changed in place or hidden."""
 
     def __init__(self, scene: SceneApi, page: Page | None = None) -> None:
         self._scene, self._page = scene, page
         self._drawn: dict[str, tuple[Any, SceneNode]] = {}
 
     def draw(self, shapes: Shapes) -> None:
-        """Draw these shapes and hide all others; what has not changed is not sent."""
+        """Draw shapes and hide all others; unchanged properties are not sent."""
         for name, (handle, _) in self._drawn.items():
             if shapes.get(name) is None and handle.visible:
                 handle.visible = False
@@ -52,84 +52,82 @@ class Nodes:
                 self._drawn[name] = self._handle(name, shape), shape
 
     def _handle(self, name: str, shape: SceneNode) -> Any:
-        known = self._drawn.get(name)
-        if known is None or not _same(known[1].stays, shape.stays):
-            handle = getattr(self._scene, shape.add)(name, **shape.stays, **shape.follows)
+        drawn = self._drawn.get(name)
+        if drawn is None or not _same(drawn[1].constant, shape.constant):
+            handle = getattr(self._scene, shape.add)(name, **shape.constant, **shape.assigned)
             if shape.on_update is not None:
                 handle.on_update(shape.on_update)
             return handle
-        handle, held = known
-        for word, value in shape.follows.items():
+        handle, previous = drawn
+        for word, value in shape.assigned.items():
             if word == "position" and self._page is not None:  # viser takes ten times as long
                 self._page.run_script(f'warpspaceMesh.move("{name}",{value.tolist()});')
-            elif value is not held.follows[word]:
+            elif value is not previous.assigned[word]:
                 setattr(handle, word, value)
         if not handle.visible:
             handle.visible = True
         return handle
 
 
-def _same(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
+def _same(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
     return all(
-        np.array_equal(value, held[word]) if isinstance(value, np.ndarray) else value == held[word]
-        for word, value in wanted.items()
+        np.array_equal(value, old[word]) if isinstance(value, np.ndarray) else value == old[word]
+        for word, value in new.items()
     )
 
 
 def lines(
     pieces: Array | Pieces, rgb: Rgb | NDArray[np.uint8], width_px: float
 ) -> SceneNode | None:
-    """Give pieces of line, [S, 2, 3], in one colour or many, as thick from near and far."""
-    stays = {"thickness": width_px, "thickness_units": "screen", "scale": SCENE_PER_MM}
+    """Draw line segments, [S, 2, 3], in one colour or many, with a constant width on screen."""
+    constant = {"thickness": width_px, "thickness_units": "screen", "scale": SCENE_PER_MM}
     colours = line_colour(rgb) if isinstance(rgb, tuple) else rgb
-    follows = {"points": pieces.astype(np.float32), "colors": colours}
-    return SceneNode("add_line_segments", stays, follows) if len(pieces) else None
+    assigned = {"points": pieces.astype(np.float32), "colors": colours}
+    return SceneNode("add_line_segments", constant, assigned) if len(pieces) else None
 
 
-def mesh(vertices_mm: Array, triangles: NDArray[Any], rgb: Rgb, **more: object) -> SceneNode:
-    """Give a lit body; `more` goes to viser as it is."""
-    stays = {"faces": triangles.astype(np.uint32), **UNLIT, **more}
-    follows = {"vertices": vertices_mm.astype(np.float32), "color": rgb}
-    return SceneNode("add_mesh_simple", stays, follows)
+def mesh(vertices_mm: Array, triangles: NDArray[Any], rgb: Rgb, **options: object) -> SceneNode:
+    """Draw a lit body; `options` are those of viser."""
+    constant = {"faces": triangles.astype(np.uint32), **UNLIT, **options}
+    assigned = {"vertices": vertices_mm.astype(np.float32), "color": rgb}
+    return SceneNode("add_mesh_simple", constant, assigned)
 
 
 def ball(at_mm: Array, radius_mm: float, rgb: Rgb) -> SceneNode:
-    """Give the marker of a point, [3]."""
-    stays = {**UNLIT, "scale": radius_mm * SCENE_PER_MM}
-    return SceneNode("add_icosphere", stays, {"position": at_mm * SCENE_PER_MM, "color": rgb})
+    constant = {**UNLIT, "scale": radius_mm * SCENE_PER_MM}
+    return SceneNode("add_icosphere", constant, {"position": at_mm * SCENE_PER_MM, "color": rgb})
 
 
 def ellipsoid(at_mm: Array, square_mm2: Array, rgb: Rgb, opacity: float) -> SceneNode:
-    """Give one about a point; along a unit vector v it extends by the root of v · square · v."""
+    """Draw an ellipsoid; its extent along a unit vector v is the root of v · square · v."""
     values, axes = np.linalg.eigh(square_mm2)
     axes[:, 0] *= np.linalg.det(axes)  # right-handed
     scale = SCENE_PER_MM * np.sqrt(np.maximum(values, 0.0))
-    follows = {"position": at_mm * SCENE_PER_MM, "wxyz": SO3.from_matrix(axes).wxyz, "color": rgb}
-    stays = {"opacity": opacity, "cast_shadow": False, "receive_shadow": False}
-    return SceneNode("add_icosphere", stays, {**follows, "scale": tuple(scale.tolist())})
+    assigned = {"position": at_mm * SCENE_PER_MM, "wxyz": SO3.from_matrix(axes).wxyz, "color": rgb}
+    constant = {"opacity": opacity, "cast_shadow": False, "receive_shadow": False}
+    return SceneNode("add_icosphere", constant, {**assigned, "scale": tuple(scale.tolist())})
 
 
 def dots(at_mm: Array, size_mm: float, rgb: Rgb) -> SceneNode | None:
-    """Give points, [n, 3], as flat circles."""
-    stays = {
+    constant = {
         "point_size": size_mm, "point_shape": "circle", "point_shading": "flat",
         "precision": "float32", "scale": SCENE_PER_MM,
     }  # fmt: skip
-    follows = {"points": at_mm.astype(np.float32), "colors": np.array(rgb, dtype=np.uint8)}
-    return SceneNode("add_point_cloud", stays, follows) if len(at_mm) else None
+    assigned = {"points": at_mm.astype(np.float32), "colors": np.array(rgb, dtype=np.uint8)}
+    return SceneNode("add_point_cloud", constant, assigned) if len(at_mm) else None
 
 
-# --- Pieces of line -------------------------------------------------------------------------------
+# --- Line segments --------------------------------------------------------------------------------
 
 
 def polylines(points: Sequence[Array]) -> Array:
-    """Cut polylines, [n, 3] each, into pieces, [S, 2, 3]."""
+    """Split polylines, [n, 3] each, into segments, [S, 2, 3]."""
     cut = [np.stack([line[:-1], line[1:]], axis=1) for line in points]
     return np.concatenate([np.zeros((0, 2, 3)), *cut])
 
 
 def dashes(pieces: Array, dash: float, gap: float) -> Array:
-    """Cut straight lines, [S, 2, 3], into dashes."""
+    """Split line segments, [S, 2, 3], into dashes."""
     parts = [np.zeros((0, 2, 3))]
     for start, end in pieces:
         length = float(np.linalg.norm(end - start))
@@ -144,7 +142,7 @@ def dashes(pieces: Array, dash: float, gap: float) -> Array:
     return np.concatenate(parts)
 
 
-# --- The light of the scene: plain lamps, and no picture of a surrounding -------------------------
+# --- Lights ---------------------------------------------------------------------------------------
 
 AMBIENT = 1.2
 LAMP = 3.2
@@ -152,11 +150,10 @@ LAMP_FROM = (-2.0, -5.0, 10.0)
 
 
 def light_scene(scene: SceneApi) -> None:
-    """Light what is not coloured by numbers: bodies of the machine, markers.
+    """Add lights for machine bodies and markers; the map is unlit.
 
-    viser's own lights are a photograph of a surrounding and lamps with shadows. A page stays nearly
-    invisible until the photograph has been worked into the materials, which takes seconds where
-    there is no graphics card, and shadows cost every picture. The map itself needs no light.
+    viser's default lights are an environment map and lamps with shadows. Without a graphics card,
+    the environment map delays the first picture by seconds, and shadows slow down every picture.
     """
     scene.configure_environment_map(None)
     scene.configure_default_lights(enabled=False)

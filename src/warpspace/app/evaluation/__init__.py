@@ -1,1 +1,1 @@
-"""From a state to values: numpy only, no browser."""
+"""Evaluation of states with numpy, independent of the browser."""

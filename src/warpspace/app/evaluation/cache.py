@@ -1,4 +1,4 @@
-"""Results of slow functions, kept up to a number of bytes for all sessions together."""
+"""Cache of slow functions, and a lock for slow work, shared by all sessions."""
 
 import threading
 from collections import OrderedDict
@@ -10,7 +10,7 @@ T = TypeVar("T")
 
 
 class Cache(Generic[T]):
-    """The latest results of slow functions, up to a number of bytes, for all sessions together."""
+    """Latest results of slow functions, up to a number of bytes."""
 
     def __init__(self, limit_bytes: int) -> None:
         self._limit = limit_bytes
@@ -19,10 +19,10 @@ class Cache(Generic[T]):
 
     def get(self, key: Hashable, build: Callable[[], T], size: Callable[[T], int]) -> T:
         with self._lock:
-            found = self._items.get(key)
-            if found is not None:
+            cached = self._items.get(key)
+            if cached is not None:
                 self._items.move_to_end(key)
-                return found[0]
+                return cached[0]
         value = build()
         with self._lock:
             self._items[key] = (value, size(value))
@@ -31,16 +31,15 @@ class Cache(Generic[T]):
         return value
 
 
-# --- Slow work of all tabs together, whatever its kind --------------------------------------------
-# One at a time, so that sliders stay quick.
+# --- Slow work of all tabs: one job at a time, so that sliders stay responsive --------------------
 
 POLL_S = 0.1
 _TURN = threading.Lock()
 
 
 @contextmanager
-def taken_turn(watch: Callable[[], object]) -> Generator[None]:
-    """Wait until nothing else is worked on; `watch` raises where nobody waits any more."""
+def exclusive_work(watch: Callable[[], object]) -> Generator[None]:
+    """Wait for the end of other slow work; `watch` raises when the job is cancelled."""
     while not _TURN.acquire(timeout=POLL_S):
         watch()
     try:

@@ -1,8 +1,8 @@
-"""Two states side by side, and what results propose: drawn beside what is shown, or in its place.
+"""Comparison of two states, and preview and application of proposals.
 
-Both are drawn with one grid, colours and display factor, their change in its own colours. It is
-taken node by node, so the nominal volumes must coincide. Where they do not, the two sides are still
-shown and the reason stands in `Compared.refused`.
+Both sides have one grid, one colour scale and one exaggeration; their difference has its own scale.
+It is evaluated node by node, so the nominal volumes must coincide. Where they do not, the sides can
+be shown, and `Compared.refused` states the reason.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,18 +16,18 @@ from warpspace.picture.model import choose_scale, same_nodes, subtract_pictures,
 from warpspace.scene.model import Scene
 
 BEFORE, AFTER = "before", "after"
-"""What was pinned, and what is steered beside it."""
-DIGITS = 3  # decimals of a proposed error, µm or µrad: a nanometre is nothing to be set
+"""Labels of a pinned state and of the present one."""
+DIGITS = 3  # decimals of a proposed error, µm or µrad
 LOOKED_AT = (
     "component", "nodes", "exaggeration", "look", "machine", "shown", "part", "forms", "picked",
     "lever",
 )  # fmt: skip
-"""What of the present state a side is looked at with."""
-REFUSED = "The working volumes are not the same, so there is no difference node by node."
+"""Fields of the present state that apply to both sides."""
+REFUSED = "The working volumes differ, so no difference can be computed node by node."
 
 
 def side_state(now: AppState, side: Side) -> AppState:
-    """Give the state of one side, looked at as the present one."""
+    """Return the state of one side, with the display settings of the present one."""
     base = side.state or now
     if side.is_scene:
         spans = base.position_spans
@@ -35,13 +35,13 @@ def side_state(now: AppState, side: Side) -> AppState:
         base = replace(base, loop=now.loop, placed=now.placed, positions=at)
     points = base.scene.trace_points_mm == now.scene.trace_points_mm
     turns_alike = points and base.positions.keys() == now.positions.keys()
-    found = replace(
+    viewed = replace(
         base,
         rotary=now.rotary if turns_alike else RotaryLook(),
         comparison=Comparison(),
         **{name: getattr(now, name) for name in LOOKED_AT},
     )
-    return found.within_reach()
+    return viewed.within_reach()
 
 
 def scene_side(scene: Scene) -> Side:
@@ -49,14 +49,14 @@ def scene_side(scene: Scene) -> Side:
 
 
 def pinned_side(state: AppState) -> Side:
-    """Make the side "before" of what is steered; it holds no comparison of its own."""
+    """Build the side "before" from the present state, without its comparison."""
     edited = f"{len(state.changed_keys)} changed" if state.changed_keys else ""
-    words = (state.scene.title or state.scene.name, edited, table_words(state))
-    return Side(f"{BEFORE}: {' · '.join(filter(None, words))}", plain_state(state))
+    title_parts = (state.scene.title or state.scene.name, edited, table_words(state))
+    return Side(f"{BEFORE}: {' · '.join(filter(None, title_parts))}", plain_state(state))
 
 
 def plain_state(state: AppState) -> AppState:
-    """Give a state as the side of a comparison: with none of its own, and nothing asked."""
+    """Return a state as the side of a comparison: without comparison, picked point and forms."""
     return replace(state, comparison=Comparison(), picked=None, lever="", forms={})
 
 
@@ -64,22 +64,22 @@ def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState)
     chosen = state.comparison
     other_side = chosen.b or Side()
     sides = [single(side_state(state, side)) for side in (chosen.a, other_side)]
-    if len({one.quantity for one in sides}) > 1:  # one of them states no uncertainty
+    if len({picture.quantity for picture in sides}) > 1:  # one has no uncertainty
         plain = replace(state, look=replace(state.look, quantity="position"))
         sides = [single(side_state(plain, side)) for side in (chosen.a, other_side)]
-    factor = min(one.exaggeration for one in sides)
+    factor = min(picture.exaggeration for picture in sides)
     a, b = (
-        one if one.exaggeration == factor else single(replace(one.state, exaggeration=factor))
-        for one in sides
+        side if side.exaggeration == factor else single(replace(side.state, exaggeration=factor))
+        for side in sides
     )
     refused = "" if same_nodes(a.grid.nominal_mm, b.grid.nominal_mm) else REFUSED
     difference = None if refused else _difference(a, b)
     scale = _shared_scale(state, [a, b])
-    shown = "b" if refused and chosen.shown == "difference" else chosen.shown
-    drawn, other = {"a": (a, b), "b": (b, a), "difference": (difference or b, None)}[shown]
+    view = "b" if refused and chosen.shown == "difference" else chosen.shown
+    drawn, other = {"a": (a, b), "b": (b, a), "difference": (difference or b, None)}[view]
     alike = other is not None and other.drawn_mm.shape == drawn.drawn_mm.shape
     compared = Compared(
-        shown,
+        view,
         (_title(state, chosen.a), _title(state, other_side, chosen.a)),
         (a.state, b.state),
         a.statistics,
@@ -96,8 +96,8 @@ def _title(state: AppState, side: Side, before: Side | None = None) -> str:
     if side.state:
         return side.title
     name = AFTER if before and before.state and not before.is_scene else PRESENT
-    words = (state.scene.title or state.scene.name, table_words(state))
-    return f"{name}: {' · '.join(filter(None, words))}"
+    title_parts = (state.scene.title or state.scene.name, table_words(state))
+    return f"{name}: {' · '.join(filter(None, title_parts))}"
 
 
 def _difference(a: LivePicture, b: LivePicture) -> LivePicture:
@@ -108,9 +108,9 @@ def _difference(a: LivePicture, b: LivePicture) -> LivePicture:
         change,
         traces=subtract_traces(b.traces, a.traces),
         slices=tuple(
-            subtract_pictures(one, other)
-            for one, other in zip(b.slices, a.slices, strict=False)
-            if same_nodes(one.grid.nominal_mm, other.grid.nominal_mm)
+            subtract_pictures(plane, other)
+            for plane, other in zip(b.slices, a.slices, strict=False)
+            if same_nodes(plane.grid.nominal_mm, other.grid.nominal_mm)
         ),
     )
 
@@ -119,38 +119,37 @@ def _shared_scale(state: AppState, maps: Sequence[LivePicture]) -> ColourScale:
     if state.look.range_mode == "fixed":
         return maps[0].scale
     widest = max((picture.scale for picture in maps), key=lambda scale: scale.high)
-    held = choose_scale([one.values for one in maps], state.component, maps[0].quantity)
-    return held if held.high > widest.high else widest
+    shared = choose_scale([picture.values for picture in maps], state.component, maps[0].quantity)
+    return shared if shared.high > widest.high else widest
 
 
 def with_sides(state: AppState, a: Side, b: Side | None) -> AppState:
-    """Compare two sides; None for b ends it."""
     if b is None:
         return replace(state, comparison=state.comparison.off())
     return replace(state, comparison=replace(state.comparison, a=a, b=b))
 
 
 def with_pin(state: AppState) -> AppState:
-    """Pin what is steered as the state before (A); what is steered from then on is B, after."""
+    """Pin the present state as A, before; further changes apply to B, after."""
     return with_before(state, pinned_side(state))
 
 
 def with_before(state: AppState, side: Side) -> AppState:
-    """Take a side as the state before (A); what is steered is B, after, and drawn."""
+    """Compare a side as A, before, with the present state as B, after, which is drawn."""
     comparison = replace(state.comparison, a=side, b=Side(), shown="b", pinned=side)
     return replace(state, comparison=comparison)
 
 
 def applied(state: AppState, scene: Scene) -> AppState:
-    own = state.scene
+    present = state.scene
     if (
-        scene.machine.axes != own.machine.axes
-        or scene.workspace.volume_axes != own.workspace.volume_axes
+        scene.machine.axes != present.machine.axes
+        or scene.workspace.volume_axes != present.workspace.volume_axes
     ):
         return state.with_scene(scene)
     fresh = start_state(scene)
     values = {key: round(value, DIGITS) for key, value in fresh.amplitudes.items()}
-    kept = {
+    inactive = {
         key: value
         for key, value in state.amplitudes.items()
         if key in fresh.amplitudes and not state.exclusions.active(key)
@@ -158,9 +157,9 @@ def applied(state: AppState, scene: Scene) -> AppState:
     start = {key: state.start.get(key, 0.0) for key in fresh.amplitudes}
     return replace(
         state,
-        scene=replace(scene, title=own.title, name=own.name),
+        scene=replace(scene, title=present.title, name=present.name),
         loaded=state.origin,
-        amplitudes={**values, **kept},
+        amplitudes={**values, **inactive},
         start=start,
         tolerances=scene.tolerances,
     )
@@ -174,39 +173,34 @@ def with_proposal(state: AppState, scene: Scene, title: str) -> AppState:
 
 
 def with_applied(state: AppState, scene: Scene, before: str) -> AppState:
-    """Apply a proposal; the state before it stays as A of a comparison."""
     return applied(with_before(state, Side(before, plain_state(state))), scene)
 
 
-# --- The table of compensation whose effect is drawn: in words, and without it --------------------
+# --- The applied compensation table ---------------------------------------------------------------
 
-WITHOUT = "Of the machine without the table of compensation, which the box is drawn with: {}."
-"""Said wherever numbers are worked out from the errors, not taken from what is drawn."""
+WITHOUT = "For the machine without the compensation table {}, which is applied to the box."
+"""Remark on numbers that are computed from the errors, not from the drawn field."""
 
 
 def table_words(state: AppState) -> str:
-    """Say which table corrects the machine; empty where none does."""
+    """Return the remark on the applied table; empty without one."""
     return "" if state.controller is None else f"with the table {state.controller.label}"
 
 
 def drawn_tables(state: AppState) -> tuple[str, ...]:
-    """Name the tables of a state and of what it is compared with, each once."""
     sides = (Side(), state.comparison.a, state.comparison.b or Side())
     tables = [(side.state or state).controller for side in sides]
     return tuple(dict.fromkeys(table.label for table in tables if table is not None))
 
 
 def without_words(state: AppState) -> str:
-    """Say that numbers are of the machine without a table; empty where there is none."""
+    """Return the remark that numbers are for the machine without table; empty without one."""
     names = " and ".join(drawn_tables(state))
     return WITHOUT.format(names) if names else ""
 
 
 def without_table(state: AppState) -> AppState:
-    """Give a state without its table; a comparison that has one ends, since it would be another.
-
-    What was pinned goes with it, if it has a table.
-    """
+    """Return a state without table, and without a comparison or pinned state that has one."""
     if not drawn_tables(state):
         return state
     return replace(state, controller=None, comparison=replace(state.comparison.off(), pinned=None))

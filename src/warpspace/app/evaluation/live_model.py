@@ -1,6 +1,6 @@
-"""From a state to the picture of it: numpy only, no browser.
+"""Evaluation of a state into a picture.
 
-Grids and first-order responses are kept, since they change only with the scene, the density, the
+Grids and first-order responses are cached, since they change only with the scene, the density, the
 rotary positions and the loop; a slider move is then one matrix-vector product.
 """
 
@@ -29,19 +29,19 @@ from warpspace.scene.model import grid_basis
 from warpspace.units import Array
 
 CACHE_BYTES = 400_000_000
-KEPT = 0.27  # place of the colour of what keeps the limit, on the scale of signed values
+WITHIN_LIMIT = 0.27  # place on the scale of signed values: colour of values within the limit
 TRACE_SAMPLES = 73  # points along a trace: every five degrees of a turn
 T = TypeVar("T")
 Responding: TypeAlias = tuple[T, ErrorBasis]
-"""A grid, or traces of rotary axes, and its first-order response."""
+"""A grid, or traces of rotary axes, with its first-order response."""
 Response: TypeAlias = tuple[Responding[Grid], tuple[Responding[TraceGroup], ...]]
 
 
 class LiveModel:
-    """Turns states into pictures; one for all sessions, usable from any thread."""
+    """Evaluates states into pictures; shared by all sessions, thread-safe."""
 
     def __init__(self) -> None:
-        self._kept: Cache[Any] = Cache(CACHE_BYTES)
+        self._cache: Cache[Any] = Cache(CACHE_BYTES)
 
     def evaluate(self, state: AppState) -> LivePicture:
         if state.comparison.b is not None:
@@ -51,7 +51,7 @@ class LiveModel:
     def _single(self, state: AppState) -> LivePicture:
         rotary = state.rotary
         key = _place(state), rotary.off, rotary.own_mm, tuple(rotary.held.items())
-        response: Response = self._kept.get(key, lambda: _build(state), _size)
+        response: Response = self._cache.get(key, lambda: _build(state), _size)
         (grid, basis), traces = response
         field = self._field(state, grid, basis)
         size = model.picture_size_mm(state.scene, grid)
@@ -99,23 +99,22 @@ class LiveModel:
     def _uncertainty(
         self, state: AppState, grid: Grid, field: ErrorField
     ) -> FieldUncertainty | None:
-        """Say how sure errors over a grid are; a slider that is moved keeps its covariance."""
         scene = state.scene
         if scene.covariance is None and not scene.uncertainty:
             return None
 
-        def build() -> FieldUncertainty | None:  # something is stated
+        def build() -> FieldUncertainty | None:
             return field_uncertainty(
                 scene, field.error_um, grid.coordinates, state.view(), grid.point_mm
             )
 
         key = "uncertainty", Identity(grid), _place(state)
-        found: FieldUncertainty = self._kept.get(key, build, lambda one: 3 * one.response.nbytes)
-        axes, known = loop_axes(scene.model, state.loop), found.errors.keys
-        acting = (key for key, value in state.active.items() if value and key not in known)
-        unknown = [key for key in acting if parameter(key).axis in axes]
-        doubt = replace(found.errors, unknown=tuple(unknown))
-        return replace(found, errors=doubt, error_um=field.error_um, shares=grid.weights)
+        uncertainty: FieldUncertainty = self._cache.get(key, build, _uncertainty_size)
+        axes, stated = loop_axes(scene.model, state.loop), uncertainty.errors.keys
+        unstated = (key for key, value in state.active.items() if value and key not in stated)
+        unknown = [key for key in unstated if parameter(key).axis in axes]
+        errors = replace(uncertainty.errors, unknown=tuple(unknown))
+        return replace(uncertainty, errors=errors, error_um=field.error_um, shares=grid.weights)
 
     def _slices(self, state: AppState) -> Iterator[tuple[str, float, Grid, ErrorField]]:
         scene, workspace = state.scene, state.scene.workspace.moved(state.positions)
@@ -127,14 +126,14 @@ class LiveModel:
         if state.look.surface == "slices":
             for axis, at in slice_positions(scene, state.look, state.machine).items():
                 key = _place(state), axis, at
-                held = self._kept.get(key, partial(build, axis, at), lambda one: _size((one, ())))
-                yield axis, at, held[0], self._field(state, *held)
+                plane, basis = self._cache.get(key, partial(build, axis, at), _basis_size)
+                yield axis, at, plane, self._field(state, plane, basis)
 
     def _field(self, state: AppState, of: Grid | TraceGroup, basis: ErrorBasis) -> ErrorField:
-        """Evaluate a grid or traces: to first order, or what a table of compensation leaves.
+        """Evaluate a grid or traces: to first order, or the residual error of a compensation table.
 
-        What does not depend on the errors (what the controller adds, where the axes stand then) is
-        kept; a slider move is then one evaluation of the exact chain.
+        Corrections and axis positions, which do not depend on the errors, are cached; a slider move
+        is then one evaluation of the exact chain.
         """
         controller, scene = state.controller, state.scene
         on_trace = isinstance(of, TraceGroup)
@@ -142,23 +141,32 @@ class LiveModel:
             amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
             return basis.evaluate(amplitudes, orientation=state.look.tilts and not on_trace)
         loop, point_mm = (of.loop, of.nominal_mm) if on_trace else (state.loop, None)
-        held = tuple((scene.reference or {}).items()), tuple(state.positions.items())
-        key = Identity(controller), Identity(of), Identity(scene.model), held, loop, state.seen
+        positions = tuple((scene.reference or {}).items()), tuple(state.positions.items())
+        identities = Identity(controller), Identity(of), Identity(scene.model)
+        key = *identities, positions, loop, state.view_key
         now = state.active_scene()
-        kept = self._kept.get(
+        prepared = self._cache.get(
             key,
             lambda: controller.at(of.coordinates, of.nominal_mm, now, loop, point_mm),
             lambda found: found.nbytes,
         )
-        return kept.field(now.errors)
+        return prepared.field(now.errors)
 
 
 def _place(state: AppState) -> tuple[object, ...]:
-    return Identity(state.scene), state.nodes, tuple(state.positions.items()), state.seen
+    return Identity(state.scene), state.nodes, tuple(state.positions.items()), state.view_key
 
 
-def _size(held: Response) -> int:
-    return sum(one.position.nbytes + one.orientation.nbytes for _, one in (held[0], *held[1]))
+def _uncertainty_size(uncertainty: FieldUncertainty) -> int:
+    return 3 * uncertainty.response.nbytes
+
+
+def _basis_size(responding: Responding[Any]) -> int:
+    return responding[1].position.nbytes + responding[1].orientation.nbytes
+
+
+def _size(response: Response) -> int:
+    return sum(map(_basis_size, (response[0], *response[1])))
 
 
 def _build(state: AppState) -> Response:
@@ -167,22 +175,23 @@ def _build(state: AppState) -> Response:
     positions = {**scene.workspace.positions, **state.positions}
     points = state.rotary.points_mm(scene)
     groups = build_traces(scene.model, points, positions, TRACE_SAMPLES, state.rotary.held)
-    given = scene.model, scene.errors, scene.parameter_keys
-    traces = tuple(
-        (one, build_basis(*given, one.coordinates, state.view(one.loop), one.nominal_mm))
-        for one in groups
-    )
+
+    def build_trace_basis(group: TraceGroup) -> ErrorBasis:
+        at, point, view = group.coordinates, group.nominal_mm, state.view(group.loop)
+        return build_basis(scene.model, scene.errors, scene.parameter_keys, at, view, point)
+
+    traces = tuple((group, build_trace_basis(group)) for group in groups)
     return (grid, grid_basis(scene, grid, state.view())), traces
 
 
 @dataclass(frozen=True)
 class PassFail(ColourScale):
-    """Two colours: what keeps a limit, and what does not."""
+    """Two colours: within a limit, and above."""
 
     limit: float = 0.0
 
     def fraction(self, values: Array) -> Array:
-        return np.where(np.asarray(values) > self.limit, 1.0 - KEPT, KEPT)
+        return np.where(np.asarray(values) > self.limit, 1.0 - WITHIN_LIMIT, WITHIN_LIMIT)
 
     @property
     def ticks(self) -> tuple[float, ...]:
@@ -190,7 +199,7 @@ class PassFail(ColourScale):
 
 
 def _chosen_colours(state: AppState, volume: model.Picture, basis: ErrorBasis) -> ColourScale:
-    """Give the colours that a user has chosen: fixed, shared, or with round ends."""
+    """Return the selected colour scale: fixed, shared, or with round ends."""
     quantity, component, look = volume.quantity, state.component, state.look
     field, values = volume.field, volume.values
     if look.pass_fail and quantity == "position" and component == "norm":
@@ -199,8 +208,8 @@ def _chosen_colours(state: AppState, volume: model.Picture, basis: ErrorBasis) -
         return PassFail(0.0, top, diverging=True, label=scale.label, unit=scale.unit, limit=limit)
     if look.range_mode == "shared" and quantity != "uncertainty":
         opened = basis.evaluate(np.array([state.start[key] for key in basis.keys]))
-        both = (model.coloured_error(one, quantity) for one in (field, opened))
-        lengths = [np.linalg.norm(error, axis=-1) for error in both]
+        errors = (model.coloured_error(error_field, quantity) for error_field in (field, opened))
+        lengths = [np.linalg.norm(error, axis=-1) for error in errors]
         return model.choose_scale(lengths, component, quantity)
     end = look.range_top if look.range_mode == "fixed" else None
     return model.choose_scale([values], component, quantity, end=end)

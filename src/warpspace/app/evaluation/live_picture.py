@@ -1,4 +1,4 @@
-"""The picture of a state: what the app draws, with the comparison it belongs to."""
+"""The picture of a state or a comparison, which the app draws."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -11,9 +11,9 @@ from warpspace.analysis.statistics import Statistics
 from warpspace.app.evaluation.scene_overlays import (
     SceneOverlay,
     T,
-    bench_in_box,
-    part_in_box,
-    path_in_box,
+    bench_overlay,
+    part_overlay,
+    path_overlay,
 )
 from warpspace.app.state.app_state import AppState
 from warpspace.bench.base import BenchTest
@@ -27,57 +27,55 @@ from warpspace.units import Array
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    shown: str  # what is drawn: "a", "b" or "difference"
+    view: str  # "a", "b" or "difference"
     titles: tuple[str, str]  # names of the two sides
-    sides: tuple[AppState, AppState]  # what they are, looked at as now
+    sides: tuple[AppState, AppState]  # with the present display settings
     a: Statistics
     b: Statistics
-    # of the length of the change at each node, |E_B − E_A|; None where there is no difference
+    # of the length of the difference at each node, |E_B − E_A|; None where there is none
     difference: Statistics | None
-    # [nx, ny, nz, 3], or None; displaced nodes of the side that is not drawn; None for the
-    # difference
+    # [nx, ny, nz, 3]; displaced nodes of the other side; None for the difference
     other_mm: Array | None
-    refused: str = ""  # why there is no difference; empty where there is one
+    refused: str = ""  # reason for a missing difference
 
     @property
     def title(self) -> str:
-        """Name of what is drawn."""
         a, b = self.titles
-        if self.shown != "difference":
-            return f"A: {a}" if self.shown == "a" else f"B: {b}"
+        if self.view != "difference":
+            return f"A: {a}" if self.view == "a" else f"B: {b}"
         a, b = (
-            one.partition(": ")[0] if one.startswith(("after", "before")) else one
-            for one in self.titles
+            title.partition(": ")[0] if title.startswith(("after", "before")) else title
+            for title in self.titles
         )
         return f"B − A: {b} − {a}"
 
 
 @dataclass(frozen=True, kw_only=True)
 class LivePicture(Picture):
-    state: AppState  # what is steered
+    state: AppState  # the present state
     traces: tuple[TraceLines, ...]
-    compared: Compared | None = None  # the comparison it belongs to
+    compared: Compared | None = None
 
     @cached_property
     def size_mm(self) -> float:
-        """Length that marks are sized by, mm, for a single point too."""
+        """Reference length of marker sizes, mm; defined for a single point, too."""
         return picture_size_mm(self.state.scene, self.grid)
 
     @cached_property
     def bench(self) -> SceneOverlay[type[BenchTest]] | None:
-        """The path of the standard test that is run; None where none is, or cannot be."""
-        return None if self.is_difference else bench_in_box(self.drawn_state)
+        """The path of the selected standard test; None where there is none, or it cannot be run."""
+        return None if self.is_difference else bench_overlay(self.drawn_state)
 
     @cached_property
     def part(self) -> SceneOverlay[Workpiece] | None:
-        return self._in_box(part_in_box)
+        return self._in_box(part_overlay)
 
     @cached_property
     def path(self) -> SceneOverlay[ToolPath] | None:
-        return self._in_box(path_in_box)
+        return self._in_box(path_overlay)
 
     def _in_box(self, find: Callable[[AppState], SceneOverlay[T] | None]) -> SceneOverlay[T] | None:
-        """Find a part or a path; of a difference its change; None where none is, or cannot be."""
+        """Evaluate an overlay; for a difference its change; None where there is none."""
         if not self.is_difference or self.compared is None:
             return find(self.drawn_state)
         a, b = map(find, self.compared.sides)
@@ -85,40 +83,39 @@ class LivePicture(Picture):
             return None
         return replace(b, error_um=b.error_um - a.error_um)
 
-    def coloured(self, found: SceneOverlay[Any]) -> tuple[Array, ColourScale]:
-        """Give what is coloured of it, in the colours of the map; along normals in its own."""
-        if self.state.part.normal and isinstance(found.of, Workpiece):
-            normals = found.of.corners.normals @ found.pose[:3, :3].T
-            values = np.einsum("ij,ij->i", found.error_um[found.at], normals)
+    def coloured(self, overlay: SceneOverlay[Any]) -> tuple[Array, ColourScale]:
+        """Return coloured values and colour scale of an overlay."""
+        if self.state.part.normal and isinstance(overlay.of, Workpiece):
+            normals = overlay.of.corners.normals @ overlay.pose[:3, :3].T
+            values = np.einsum("ij,ij->i", overlay.error_um[overlay.at], normals)
             return values, choose_scale([values], "x")
-        values = component_values(found.error_um, self.component)[found.at]
+        values = component_values(overlay.error_um, self.component)[overlay.at]
         return values, choose_scale([values], self.component) if self.tilts else self.scale
 
     @cached_property
     def worst_node(self) -> int:
-        """Flat number of the node where what is coloured is largest in magnitude."""
+        """Flat index of the node with the largest coloured magnitude."""
         return int(np.argmax(np.abs(self.values)))
 
     @cached_property
     def moved_traces(self) -> Mapping[str, TraceLine]:
         if not self.state.shown.traces:
             return {}
-        lines = (one for of in self.traces if of.error_um.any() for one in of.each())
-        return {name_trace(one.trace): one for one in lines if is_moved(one)}
+        lines = (line for of in self.traces if of.error_um.any() for line in of.each())
+        return {name_trace(line.trace): line for line in lines if is_moved(line)}
 
     @property
     def drawn_state(self) -> AppState:
-        """The state that is drawn: the one steered, or a side of a comparison."""
-        found = self.compared
-        return self.state if found is None else found.sides[found.shown != "a"]
+        """The drawn state: the present one, or a side of a comparison."""
+        compared = self.compared
+        return self.state if compared is None else compared.sides[compared.view != "a"]
 
     @property
     def title(self) -> str:
-        """Name of what is drawn: the scene, or a side of a comparison, or the difference."""
         return self.state.scene.title if self.compared is None else self.compared.title
 
-    def both_words(self, word: Callable[[AppState], str]) -> str:
-        """Say something of what is drawn; of a difference for both sides where they differ."""
+    def describe_sides(self, word: Callable[[AppState], str]) -> str:
+        """Describe the drawn state; for a difference both sides where they differ."""
         if self.compared is None or not self.is_difference:
             return word(self.drawn_state)
         a, b = (word(side) for side in self.compared.sides)

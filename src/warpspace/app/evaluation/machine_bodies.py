@@ -1,4 +1,4 @@
-"""The machine of a picture: its bodies, its tool point, and the rotary axis that is played."""
+"""The machine of a picture: its bodies, its tool point, and the rotary axis that is animated."""
 
 from collections.abc import Mapping
 
@@ -14,11 +14,13 @@ from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.units import Array
 
-HERE: Mapping[str, float] = {}
+NO_POSITIONS: Mapping[str, float] = {}
 
 
-def standing(state: AppState, at: Mapping[str, float] = HERE) -> tuple[dict[str, float], Array]:
-    """Tell where all axes stand, mm and degrees, some of them elsewhere; and the tool point."""
+def standing(
+    state: AppState, at: Mapping[str, float] = NO_POSITIONS
+) -> tuple[dict[str, float], Array]:
+    """Return the positions of all axes, mm and degrees, and the tool point; `at` overrides some."""
     scene = state.scene
     linear = linear_positions(scene, state.machine)
     stands = {**scene.workspace.positions, **linear, **state.positions, **at}
@@ -28,11 +30,11 @@ def standing(state: AppState, at: Mapping[str, float] = HERE) -> tuple[dict[str,
 
 
 def drawn_bodies(
-    picture: LivePicture, turned: Mapping[str, float] = HERE, *, nominal: bool = False
+    picture: LivePicture, turned: Mapping[str, float] = NO_POSITIONS, *, nominal: bool = False
 ) -> tuple[PlacedBody, ...]:
-    """Place the bodies of a picture's machine, bent where that is chosen.
+    """Place the bodies of a picture's machine, deformed if selected.
 
-    While an axis is turned its table is drawn also where the machine is not.
+    While an axis is animated, its table is drawn also where the machine is hidden.
     """
     state, scene = picture.state, picture.state.scene
     positions, _ = standing(state, turned)
@@ -44,14 +46,14 @@ def drawn_bodies(
 
 
 def tool_point(picture: LivePicture) -> tuple[Array, Array]:
-    """Find the tool point in the deformed grid, [3], mm, and its error, [3], µm."""
+    """Compute the tool point in the deformed grid, [3], mm, and its error, [3], µm."""
     state = picture.state
     axes, nominal = standing(state)
     _, field = drawn_field(state, complete_coordinates(state.scene.machine, axes))
     return deform(nominal, field.error_um, picture.exaggeration), field.error_um
 
 
-# --- Which axis is played, where traced points are meanwhile, which trace is looked at ------------
+# --- The animated axis, its traced points, and the selected trace ---------------------------------
 
 
 def _turning_frames(state: AppState) -> tuple[str, ...]:
@@ -64,14 +66,14 @@ def _turning_frames(state: AppState) -> tuple[str, ...]:
 
 
 def played_axis(state: AppState) -> str | None:
-    """Name the rotary axis next to the workpiece, or to the tool; None where there is none."""
+    """Return the rotary axis next to the workpiece, or to the tool; None where there is none."""
     return next(iter(_turning_frames(state)[-2:]), None)
 
 
 def played_position(state: AppState, angle_deg: float) -> dict[str, float]:
-    """Give the played axis' position after an angle, degrees, kept within its travel.
+    """Return the position of the animated axis after an angle, degrees, within its travel.
 
-    An axis that cannot go round swings to and fro over its travel.
+    An axis without full rotation oscillates over its travel.
     """
     axis = played_axis(state)
     if axis is None:
@@ -85,20 +87,20 @@ def played_position(state: AppState, angle_deg: float) -> dict[str, float]:
 
 
 def points_on_traces(picture: LivePicture, position: Mapping[str, float]) -> tuple[Array, Array]:
-    """Find where the traced points are at a position of the played axis, [n, 3] each, mm."""
-    found: list[Array] = []
+    """Interpolate the traced points at a position of the animated axis, [n, 3] each, mm."""
+    interpolated: list[list[float]] = []
     for lines in picture.traces:
         for number, trace in enumerate(lines.group.traces):
             if trace.axis in position:
                 sweep, at = lines.group.coordinates[trace.axis][number], position[trace.axis]
-                both = np.concatenate([lines.nominal_mm[number], lines.actual_mm[number]], axis=1)
-                found.append(np.array([np.interp(at, sweep, column) for column in both.T]))
-    points = np.reshape(found, (-1, 6))
+                columns = np.hstack([lines.nominal_mm[number], lines.actual_mm[number]]).T
+                interpolated.append([float(np.interp(at, sweep, column)) for column in columns])
+    points = np.reshape(interpolated, (-1, 6))
     return points[:, :3], points[:, 3:]
 
 
 def chosen_trace(picture: LivePicture) -> str:
-    """Name the trace that is looked at, as long as an error moves it; empty where none does."""
+    """Return the name of the coloured trace among those that errors move; empty without any."""
     state, moved = picture.state, picture.moved_traces
     if state.rotary.chosen in moved:
         return state.rotary.chosen

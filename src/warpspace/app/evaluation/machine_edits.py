@@ -1,7 +1,7 @@
-"""The machine of a scene or a state changed, by words of the editor; machines to start from.
+"""Edits of the machine of a scene or a state, and the machines of the library.
 
-The changed machine lives in the state's scene; `AppState.origin` keeps the scene's own one. What
-belongs to axes that stay is kept.
+The edited machine is part of the state's scene; `AppState.origin` holds the original one. Errors
+and tolerances of the remaining axes are unchanged.
 """
 
 import tomllib
@@ -25,29 +25,29 @@ from warpspace.machine import definition
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
 from warpspace.machine.curves.curve import OWN_AXIS, ErrorFunction
 from warpspace.machine.errors import ErrorSet
+from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.machine_library import body_notes, load_machine, machine_names
-from warpspace.scene.model import Scene
-from warpspace.scene.scene_writer import scene_to_toml
+from warpspace.scene.model import Scene, scene_notes
+from warpspace.scene.scene_writer import over_ranges, scene_to_toml
 from warpspace.scene.starter import starter_scene
 from warpspace.units import MICROMETRE
 
-# --- A scene changed as its file: one entry, or all that says what the machine is -----------------
+# --- Edits of a scene as a document: a single entry, or the whole machine -------------------------
 
 Tables = dict[str, dict[str, Any]]
 T = TypeVar("T")
 KEYS = {"offset": "offset_mm", "rotation": "rotation_deg", "travel": "travel"}
 UNITS = {"offset": "mm", "rotation": "°", "span": "mm", "travel": "", "volume": ""}
-"""Tables of numbers; without a unit it is that of the axis."""
+"""Units of the tables of numbers; empty for the unit of the axis."""
 NOUNS = {"span": "gantry", "mesh": "body"}
-START_SPAN_MM = 1000.0  # of guides where no travel across says how far apart they are
-MOST_CHAIN_TEXT = 101  # characters of a chain that are read: one more than in a file
+START_SPAN_MM = 1000.0  # of guides without a travel across them
+MOST_CHAIN_TEXT = 101  # characters of a chain that are parsed: one more than in a file
 FRAME = "F"
-SHOWN = 30  # characters of what was typed that a message repeats
+MAX_QUOTED = 30  # characters of a typed text in a message
 
 
 def tables_of(scene: Scene) -> Tables:
-    """Give all that can be changed frame by frame."""
     machine, fixed = scene.machine, dict.fromkeys(definition.FIXED_FRAMES, definition.ORIGIN)
     offset = {name: axis.offset_mm for name, axis in machine.axes.items()}
     rotation = {name: axis.rotation_deg for name, axis in machine.axes.items()}
@@ -62,22 +62,24 @@ def tables_of(scene: Scene) -> Tables:
 
 
 def own_bodies(machine: definition.Machine) -> dict[str, definition.BodySource]:
-    """Give the bodies that a description names, without those of its machine in the library."""
-    known = load_machine(machine.name).bodies if machine.name in machine_names() else {}
-    return {frame: source for frame, source in machine.bodies.items() if known.get(frame) != source}
+    """Return the bodies of a description that are not those of the library machine."""
+    bundled = load_machine(machine.name).bodies if machine.name in machine_names() else {}
+    return {
+        frame: source for frame, source in machine.bodies.items() if bundled.get(frame) != source
+    }
 
 
 def edited(scene: Scene, word: str) -> tuple[Scene, tuple[str, ...]]:
-    """Give the scene with its machine changed as a page spells it, and what was left out.
+    """Apply an edit of the page to the machine of a scene; return notes on what was removed.
 
-    A word that is none changes nothing; what a file could not hold is refused.
+    An unknown edit changes nothing; one that a file could not hold is refused.
     """
-    what, _, rest = word.partition(" ")
+    what, _, args = word.partition(" ")
     tables, raw, machine = tables_of(scene), _document(scene), scene.machine
     guides, bodies = raw["machine"].setdefault("gantry", {}), dict(machine.bodies)
-    match what, rest.split(" ", maxsplit=2):
+    match what, args.split(" ", maxsplit=2):
         case "chain", _:
-            _rearrange(raw, scene, definition.parse_chain(rest[:MOST_CHAIN_TEXT]))
+            _rearrange(raw, scene, definition.parse_chain(args[:MOST_CHAIN_TEXT]))
         case "left" | "right" | "side" | "remove", [axis]:
             _rearrange(raw, scene, _moved(machine, what, axis))
         case "turn", [axis]:
@@ -85,17 +87,16 @@ def edited(scene: Scene, word: str) -> tuple[Scene, tuple[str, ...]]:
         case "gantry", [axis]:
             if guides.pop(axis, None) is None:
                 across = definition.default_across(machine.axis(axis).name)
-                others = [one for one in machine.axes.values() if one.is_linear]
                 spans = [
-                    one.travel[1] - one.travel[0]
-                    for one in others
-                    if definition.ACROSS[one.index] == across
+                    other.travel[1] - other.travel[0]
+                    for other in machine.axes.values()
+                    if other.is_linear and definition.ACROSS[other.index] == across
                 ]
                 guides[axis] = {"span_mm": max(spans, default=START_SPAN_MM), "across": across}
         case "across", [axis]:
             _entry(tables, "span", axis)
-            taken = (guides[axis]["across"], definition.ACROSS[direction_index(axis)])
-            guides[axis]["across"] = next(name for name in definition.ACROSS if name not in taken)
+            used = (guides[axis]["across"], definition.ACROSS[direction_index(axis)])
+            guides[axis]["across"] = next(name for name in definition.ACROSS if name not in used)
         case "mesh", [frame]:
             _entry(tables, what, frame)
             del bodies[frame]
@@ -121,7 +122,7 @@ def edited(scene: Scene, word: str) -> tuple[Scene, tuple[str, ...]]:
 def read_number(what: str, typed: str, unit: str) -> float:
     value = read_typed(typed, unit)
     if value is None:
-        text = typed if len(typed) <= SHOWN else f"{typed[:SHOWN]}…"
+        text = typed if len(typed) <= MAX_QUOTED else f"{typed[:MAX_QUOTED]}…"
         raise OptionError(f"{what} = “{text}”; expected a number in {unit}")
     return value
 
@@ -137,7 +138,7 @@ def _put(raw: Tables, key: str, frame: str, value: object) -> None:
 
 
 def _moved(machine: definition.Machine, what: str, axis: str) -> definition.Chain:
-    """Move an axis along the written chain, across the frame too; or next to it; or away."""
+    """Move an axis along the chain, also across the frame; or next to the frame; or remove it."""
     places = [*reversed(machine.chain.workpiece), FRAME, *machine.chain.tool]
     at = places.index(machine.axis(axis).name) + {"left": -1, "right": 1}.get(what, 0)
     places.remove(axis)
@@ -163,38 +164,36 @@ def _rearrange(raw: Tables, scene: Scene, chain: definition.Chain) -> None:
 
 
 def _with_machine(scene: Scene, other: Scene) -> tuple[Scene, tuple[str, ...]]:
-    """Give a scene the machine, the working volume and the points of another one."""
-    taken = _document(other)
-    raw = _document(scene) | {key: taken[key] for key in ("machine", "workspace", "points_mm")}
+    document = _document(other)
+    raw = _document(scene) | {key: document[key] for key in ("machine", "workspace", "points_mm")}
     return _read(scene, raw, other.machine)
 
 
 def _document(scene: Scene) -> Tables:
-    """Give a scene as its file would have it, the machine written out; without bodies and errors.
+    """Return a scene as the document of its file, with its machine, without bodies and errors.
 
-    A ramp is spelled by the range of its axis, which may become another one.
+    The text of a ramp refers to the range of its axis, which an edit may change.
     """
     model = replace(scene.model, machine=replace(scene.machine, name="", bodies={}))
     return tomllib.loads(scene_to_toml(replace(scene, model=model, errors=ErrorSet())))
 
 
 def _read(scene: Scene, raw: Tables, like: definition.Machine) -> tuple[Scene, tuple[str, ...]]:
-    """Read a changed document without what belongs to axes that are gone; and say what that was.
+    """Parse an edited document without entries of removed axes; return notes on those.
 
-    The machine is named after its frames: as the one that it is like, as that of the library with
-    the same ones, or as its scene. Bodies that were made for other frames suit it no more.
+    A machine with the frames of `like` or of a library machine has its name and bodies; any other
+    is named after the scene, since bodies belong to their frames.
     """
     chain = definition.parse_chain(raw["machine"]["chain"])
     gone = {a: at for a, at in scene.workspace.positions.items() if a not in chain.axes}
-    raw["convention"]["reference_axis"] = "free"  # which axis that is may have changed
-    bare = parse_scene(tomli_w.dumps(_without(raw, gone)), scene.name, "machine")
-    kept = of_axes(scene.errors.functions, chain.axes)
-    errors = ErrorSet({key: one.without_axes(gone) for key, one in kept.items()})
-    own = tuple(one for one in scene.model.own_component_errors if one[0] in chain.axes)
-    main = scene.model.component_errors
-    model = replace(bare.model, component_errors=main, own_component_errors=own)
-    text = scene_to_toml(replace(bare, model=model, errors=errors))
-    read = parse_scene(text, scene.name, "machine")
+    orders = {axis: scene.model.convention(axis).name for axis in chain.axes}
+    # the reference axis may have changed
+    raw["convention"] |= {"reference_axis": "free", "component_errors": orders}
+    read = parse_scene(tomli_w.dumps(_without(raw, gone)), scene.name, "machine")
+    curves = of_axes(scene.errors.functions, chain.axes)
+    errors = ErrorSet({key: curve.without_axes(gone) for key, curve in curves.items()})
+    errors = over_ranges(errors, read.model, read.workspace)
+    _check_errors(errors)
     same = _frames(like) == _frames(read.machine)
     named = like if same else known_alike(read.machine)
     if named is None:
@@ -207,19 +206,26 @@ def _read(scene: Scene, raw: Tables, like: definition.Machine) -> tuple[Scene, t
         body_dir=named.body_dir,
         bodies={frame: body for frame, body in like.bodies.items() if frame not in gone},
     )
-    notes = (*read.notes, *body_notes(machine))
     model = replace(read.model, machine=machine)
-    read = replace(read, model=model, notes=notes, part=scene.part)
+    notes = (*scene_notes(machine, read.workspace, errors), *body_notes(machine))
+    read = replace(read, model=model, errors=errors, notes=notes, part=scene.part)
     return (scene, ()) if read == scene else (read, tuple(_left_out(scene, gone)))
 
 
+def _check_errors(errors: ErrorSet) -> None:
+    for key, curve in errors.functions.items():
+        if not abs(curve.amplitude) <= MAX_ERROR:
+            peak = f"{curve.amplitude:g} {parameter(key).unit}"
+            raise OptionError(f"errors.{key} reaches {peak}; expected at most ±{MAX_ERROR:g}")
+
+
 def _without(table: Tables, axes: Collection[str]) -> Tables:
-    kept = {
+    remaining = {
         key: _without(value, axes) if isinstance(value, dict) else value
         for key, value in table.items()
         if key not in axes and (key not in PARAMETERS or PARAMETERS[key].axis not in axes)
     }
-    return {key: value for key, value in kept.items() if value != {}}
+    return {key: value for key, value in remaining.items() if value != {}}
 
 
 def _frames(machine: definition.Machine) -> tuple[object, ...]:
@@ -228,13 +234,12 @@ def _frames(machine: definition.Machine) -> tuple[object, ...]:
 
 
 def known_alike(machine: definition.Machine) -> definition.Machine | None:
-    """Find the machine of the library with the same frames, whatever their travels and ways."""
-    known = map(load_machine, machine_names())
-    return next((one for one in known if _frames(one) == _frames(machine)), None)
+    """Find the library machine with the same frames; travels and directions may differ."""
+    machines = map(load_machine, machine_names())
+    return next((other for other in machines if _frames(other) == _frames(machine)), None)
 
 
 def of_axes(table: Mapping[str, T], axes: Collection[str]) -> dict[str, T]:
-    """Keep the entries of a table of parameters that belong to some axes."""
     return {key: value for key, value in table.items() if parameter(key).axis in axes}
 
 
@@ -244,34 +249,34 @@ def _left_out(scene: Scene, gone: Collection[str]) -> Iterator[str]:
         parts = {
             "its errors {}": of_axes(scene.errors.functions, [axis]),
             "its tolerances {}": of_axes(scene.tolerances.individual, [axis]),
-            "how {} depends on it": [k for k in depend if parameter(k).axis not in gone],
-            "its position at the reference": {axis} & (scene.reference or {}).keys(),
+            "the dependence of {} on it": [k for k in depend if parameter(k).axis not in gone],
+            "its reference position": {axis} & (scene.reference or {}).keys(),
         }
-        said = "; ".join(words.format(", ".join(keys)) for words, keys in parts.items() if keys)
-        yield f"axis {axis} left out{f' and with it {said}' if said else ''}"
+        losses = "; ".join(words.format(", ".join(keys)) for words, keys in parts.items() if keys)
+        yield f"axis {axis} removed{f', with {losses}' if losses else ''}"
 
 
-# --- The machine of a state: errors and tolerances that were changed stay, undo takes all back ----
+# --- The machine of a state: edited errors and tolerances stay ------------------------------------
 
-UNCHANGED = "the machine stays as it was"
+UNCHANGED = "the machine is unchanged"
 
 
 def with_word(state: AppState, word: str) -> AppState:
-    """Change the machine as a page spells it; what cannot be is refused with a note."""
-    what, *rest = word.split(" ", maxsplit=3)
-    gantry = state.scene.machine.gantries.get(rest[0]) if rest else None
+    """Apply an edit of the page to the machine of a state; a refused edit adds a note."""
+    what, *args = word.split(" ", maxsplit=3)
+    gantry = state.scene.machine.gantries.get(args[0]) if args else None
     try:
         if word == "own":
             return with_own_machine(state)
-        if what == "guide" and gantry is not None and len(rest) == 3 and rest[1] in ("0", "1"):
-            what = f"guide {int(rest[1]) + 1} of {rest[0]}"
-            value = read_number(what, rest[2], MICROMETRE)
-            return with_guide_error(state, gantry, int(rest[1]), value)
+        if what == "guide" and gantry is not None and len(args) == 3 and args[1] in ("0", "1"):
+            what = f"guide {int(args[1]) + 1} of {args[0]}"
+            value = read_number(what, args[2], MICROMETRE)
+            return with_guide_error(state, gantry, int(args[1]), value)
         scene, notes = edited(state.scene, word)
         changed = state if scene is state.scene else with_changed_scene(state, scene)
     except WarpspaceError as problem:
         return state.noted(f"{str(problem).removeprefix('machine: ')}; {UNCHANGED}")
-    if what == "span" and gantry is not None:  # the errors of both guides stay
+    if what == "span" and gantry is not None:  # the errors of both guides are unchanged
         now = scene.machine.gantries[gantry.axis]
         turned = changed.amplitudes[now.rotation_key] * now.rotation_weight
         turned /= gantry.rotation_weight
@@ -282,10 +287,12 @@ def with_word(state: AppState, word: str) -> AppState:
 def with_changed_scene(state: AppState, scene: Scene) -> AppState:
     before, keys = state.scene, scene.parameter_keys
     was, stands = before.workspace.positions, scene.workspace.positions
-    # an axis whose position in the working volume was changed goes there
-    kept = {axis: at for axis, at in state.positions.items() if was.get(axis) == stands.get(axis)}
+    # an axis whose position in the working volume was edited moves there
+    unmoved = {
+        axis: at for axis, at in state.positions.items() if was.get(axis) == stands.get(axis)
+    }
     positions = {
-        axis: span.clamp(kept.get(axis, stands[axis]), span.low)
+        axis: span.clamp(unmoved.get(axis, stands[axis]), span.low)
         for axis, span in position_spans(scene).items()
     }
     tolerances = of_axes(state.tolerances.individual, scene.machine.axes)
@@ -299,7 +306,7 @@ def with_changed_scene(state: AppState, scene: Scene) -> AppState:
         specification=replace(state.specification, fixed=fixed),
         picked=state.picked if scene.machine.chain == before.machine.chain else None,
         lever=state.lever if state.lever in keys else "",
-        # the table of another machine would correct nothing here
+        # a table is valid for its machine only
         controller=state.controller if scene.model == before.model else None,
     )
     curves = changed.own_curves
@@ -308,50 +315,53 @@ def with_changed_scene(state: AppState, scene: Scene) -> AppState:
 
 
 def _amplitude(state: AppState, scene: Scene, key: str) -> float:
-    """Give an amplitude in a changed scene: in a larger volume the same curve may reach further."""
+    """Return an amplitude in an edited scene; the same curve may be larger over a larger volume."""
     if key not in state.amplitudes:
         return scene.errors.amplitude(key)
     present = state.amplitudes[key]
-    was, now = (one.errors.functions.get(key) for one in (state.scene, scene))
+    was, now = (side.errors.functions.get(key) for side in (state.scene, scene))
     if was is None or now is None or was == now or was.amplitude == 0.0:
         return present
     return now.amplitude * (present / was.amplitude)
 
 
 def with_own_machine(state: AppState) -> AppState:
-    """Go back to machine, working volume and points of the scene as it was opened."""
-    own, scene = state.origin, state.scene
-    if own.machine == scene.machine and own.workspace == scene.workspace:
+    """Restore machine, working volume and points of the scene as opened."""
+    original, scene = state.origin, state.scene
+    if original.machine == scene.machine and original.workspace == scene.workspace:
         return state
-    returned = own.machine.axes.keys() - scene.machine.axes.keys()
-    # curves that are the scene's own, but for the working volume, become those again
-    known, present = state.own_curves, scene.errors.functions
-    curves = {key: one for key, one in present.items() if known.get(key) != one}
+    returned = original.machine.axes.keys() - scene.machine.axes.keys()
+    # curves that differ from those as opened by the working volume only are restored
+    original_curves, present = state.own_curves, scene.errors.functions
+    curves = {key: one for key, one in present.items() if original_curves.get(key) != one}
     orders = {
-        axis: (own if axis in returned else scene).model.convention(axis).name
-        for axis in own.machine.axes
+        axis: (original if axis in returned else scene).model.convention(axis).name
+        for axis in original.machine.axes
     }
-    tolerances = {**of_axes(own.tolerances.individual, returned), **state.tolerances.individual}
+    tolerances = {
+        **of_axes(original.tolerances.individual, returned),
+        **state.tolerances.individual,
+    }
     joined = replace(
         scene,
         model=replace(scene.model, own_component_errors=tuple(orders.items())),
-        errors=ErrorSet({**own.errors.functions, **curves}),
-        reference=scene.reference and {**(own.reference or {}), **scene.reference},
+        errors=ErrorSet({**original.errors.functions, **curves}),
+        reference=scene.reference and {**(original.reference or {}), **scene.reference},
         tolerances=replace(state.tolerances, individual=tolerances),
     )
-    back, notes = _with_machine(joined, own)
+    restored, notes = _with_machine(joined, original)
     state = replace(state, tolerances=joined.tolerances)
-    return with_changed_scene(state, back).noted(*notes)
+    return with_changed_scene(state, restored).noted(*notes)
 
 
-# --- The two guides of a gantry: their errors, which the axis has as mean and rotation ------------
+# --- Errors of the two guides of a gantry, from mean and rotation of the axis ---------------------
 
 SAMPLES = 65
-ALIKE = 1e-9  # by how much two curves of amplitude 1 may differ that count as one
+ALIKE = 1e-9  # largest difference of two curves of amplitude 1 that are regarded as equal
 
 
 def guide_errors(state: AppState, gantry: definition.Gantry) -> tuple[float, float] | None:
-    """Give the positioning errors of both guides, µm; None where their curves differ."""
+    """Return the positioning errors of both guides, µm; None where their curves differ."""
     if not _alike(*_curves(state, gantry)):
         return None
     mean = state.amplitudes[gantry.positioning_key]
@@ -362,7 +372,6 @@ def guide_errors(state: AppState, gantry: definition.Gantry) -> tuple[float, flo
 def with_guide_error(
     state: AppState, gantry: definition.Gantry, guide: int, value_um: float
 ) -> AppState:
-    """Set the positioning error of one guide; the other one stays."""
     present = guide_errors(state, gantry)
     if present is None:
         raise OptionError(
@@ -385,35 +394,32 @@ def _curves(state: AppState, gantry: definition.Gantry) -> tuple[ErrorFunction, 
 def _alike(*curves: ErrorFunction) -> bool:
     if any(curve.amplitude == 0.0 for curve in curves):
         return True
-    one, other = (curve.with_amplitude(1.0) for curve in curves)
+    first, second = (curve.with_amplitude(1.0) for curve in curves)
     if any(curve.has_directions or {*curve.arguments} - {OWN_AXIS} for curve in curves):
-        return one == other
-    at = np.linspace(*one.span, SAMPLES)
-    return bool(np.abs(one.evaluate(at) - other.evaluate(at)).max() <= ALIKE)
+        return first == second
+    at = np.linspace(*first.span, SAMPLES)
+    return bool(np.abs(first.evaluate(at) - second.evaluate(at)).max() <= ALIKE)
 
 
-# --- The machines to start from: those of the bundled scenes, each once ---------------------------
+# --- Machines of the bundled scenes, each once ----------------------------------------------------
 
 
 @cache
 def library() -> Mapping[str, Scene]:
-    """Give a scene of each machine, by the machine's name: it brings its volume and points."""
-    found: dict[str, Scene] = {}
+    """Load one scene of each machine, for its volume and points, by name of the machine."""
+    scenes: dict[str, Scene] = {}
     for name in scene_names():
-        with suppress(WarpspaceError):  # a broken scene beside the others hides none of them
+        with suppress(WarpspaceError):  # a damaged scene does not hide the others
             scene = load_scene(name)
-            found.setdefault(scene.machine.name, scene)
-    return found
+            scenes.setdefault(scene.machine.name, scene)
+    return scenes
 
 
 def with_library_scene(state: AppState, scene: Scene) -> AppState:
-    """Start anew with a machine of the library: what was measured on one says nothing of another.
-
-    The machine of the scene as it was opened comes back with all that is shown.
-    """
+    """Open a machine of the library with its own errors; the original machine is restored."""
     if state.origin.machine == scene.machine:
         return with_own_machine(state)
-    left = state.scene.title
-    note = f"{scene.title}, with its own errors: those of {left} are left behind"
-    changed = replace(state.with_scene(scene), left_behind=left)
-    return changed.noted(f"{note}; undo brings them back")
+    previous = state.scene.title
+    note = f"{scene.title} with its own errors; those of {previous} were dropped"
+    changed = replace(state.with_scene(scene), left_behind=previous)
+    return changed.noted(f"{note} (Undo restores them)")

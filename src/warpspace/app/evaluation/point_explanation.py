@@ -1,4 +1,4 @@
-"""Why a point is where it is: which point a click means, and what its error is made of."""
+"""Picked points: their selection by a click, and the contributions to their error."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -28,46 +28,42 @@ from warpspace.picture.map_mesh import solid_map
 from warpspace.picture.traces import is_moved
 from warpspace.units import Array
 
-TOLERANCE_RAD = 0.0032  # how far a click may pass a trace: about seven pixels of the usual view
-BETWEEN = 5  # places looked at between two samples of a trace: one degree apart
-REACH_MM = 1e7  # rays from farther away than this come from no camera
+TOLERANCE_RAD = 0.0032  # from a click to a trace: about seven pixels of the default view
+BETWEEN = 5  # points per sample of a trace: one degree apart
+REACH_MM = 1e7  # largest distance of a camera
 PARALLEL = 1e-12
 
 
 @dataclass(frozen=True)
 class PointExplanation:
-    """A picked point explained, as it is drawn."""
+    """Error of a picked point, its contributions, and its place in the drawing."""
 
     at: Mapping[str, float]  # mm or degrees; positions of all axes
     loop: Loop
     explanation: Explanation
-    # [3]; from R to where things are drawn, on machines whose linear axes carry the workpiece
+    # [3]; from R to the drawing, on machines whose linear axes carry the workpiece
     shift_mm: Array
-    drawn_mm: Array  # [3]; where the displaced point is drawn
-    # [3]; the error that it is drawn with: the one explained, or what a table leaves of it
+    drawn_mm: Array  # [3]; displaced point in the drawing
+    # [3]; drawn error: the explained one, or the residual error of a compensation table
     drawn_um: Array
-    uncertainty: (
-        FieldUncertainty | None
-    )  # of the error that is explained; None where nothing is stated
+    uncertainty: FieldUncertainty | None  # of the explained error; None where unknown
 
     @property
     def is_corrected(self) -> bool:
-        """Whether a table corrects the point that is drawn."""
         return not np.array_equal(self.drawn_um, self.explanation.error_um)
 
     @property
     def length_um(self) -> float:
-        """Length of the error that is explained."""
         return float(np.linalg.norm(self.explanation.error_um))
 
     @cached_property
     def ranked(self) -> list[PointContribution]:
-        """What it is made of, the largest part along the error first."""
+        """Contributions, the largest component along the error first."""
         return sorted(self.explanation.contributions, key=lambda part: -abs(part.along_um))
 
 
 def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> tuple[Picked, Array] | None:
-    """Find the point of a drawn trace or surface that a ray meets, and where it is drawn, [3]."""
+    """Find the nearest point of a trace or surface on a ray, and its place in the drawing, [3]."""
     ray = np.concatenate([np.ravel(origin_mm), np.ravel(direction)]).astype(float)
     if ray.shape != (6,) or not np.isfinite(ray).all() or np.abs(ray).max() > REACH_MM:
         return None
@@ -76,29 +72,29 @@ def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> tuple[Pick
         return None
     origin, unit = ray[:3], ray[3:] / length
     traces = _on_traces(picture, origin, unit) if picture.state.shown.traces else ()
-    found = [*traces, *_on_surfaces(picture, origin, unit)]
-    if not found:
+    hits = [*traces, *_on_surfaces(picture, origin, unit)]
+    if not hits:
         return None
-    picked, distance = min(found, key=lambda one: one[1])
+    picked, distance = min(hits, key=lambda hit: hit[1])
     return picked, origin + distance * unit
 
 
 def pick_worst(picture: LivePicture) -> Picked:
-    """Give the node whose position error is largest in what is drawn."""
-    found = picture.statistics.max_at_axes
+    """Return the node with the largest position error of the picture."""
+    axes = picture.statistics.max_at_axes
     return Picked(
-        {name: at for name, at in found.items() if is_linear(name) or name in picture.grid.axes}
+        {name: at for name, at in axes.items() if is_linear(name) or name in picture.grid.axes}
     )
 
 
 def _on_surfaces(
     picture: LivePicture, origin: Array, unit: Array
 ) -> Iterator[tuple[Picked, float]]:
-    for one in picture.slices or (picture,):
-        points, triangles, node_of = solid_map(one)
+    for mapped in picture.slices or (picture,):
+        points, triangles, node_of = solid_map(mapped)
         hit = pick_surface(origin, unit, points, triangles)
         if hit is not None:
-            nodes, grid = node_of[hit.vertices], one.grid
+            nodes, grid = node_of[hit.vertices], mapped.grid
             at = {
                 name: float(np.broadcast_to(values, grid.shape).reshape(-1)[nodes] @ hit.weights)
                 for name, values in grid.coordinates.items()
@@ -111,25 +107,24 @@ def _on_traces(picture: LivePicture, origin: Array, unit: Array) -> Iterator[tup
     for lines in picture.traces:
         drawn = [number for number, line in enumerate(lines.each()) if is_moved(line)]
         dense = _denser(lines.actual_mm[drawn])
-        found = pick_point(origin, unit, dense.reshape(-1, 3), TOLERANCE_RAD)
-        if found is None:
+        hit = pick_point(origin, unit, dense.reshape(-1, 3), TOLERANCE_RAD)
+        if hit is None:
             continue
-        row, sample = divmod(found[0], dense.shape[1])
+        row, sample = divmod(hit[0], dense.shape[1])
         number, shape = drawn[row], lines.actual_mm.shape[:2]
         at = {
             name: float(_denser(np.broadcast_to(values, shape)[..., None])[number, sample, 0])
             for name, values in lines.group.coordinates.items()
         }
-        yield Picked(at, lines.group.loop, lines.group.traces[number].point_mm), found[1]
+        yield Picked(at, lines.group.loop, lines.group.traces[number].point_mm), hit[1]
 
 
 def pick_line(picture: LivePicture, origin_mm: Array, direction: Array) -> int | None:
-    """Find the line of the program whose drawn path a ray passes."""
     path = picture.path
     if path is None or not direction.any():
         return None
-    found = pick_point(origin_mm, direction, path.drawn_mm(picture.exaggeration), TOLERANCE_RAD)
-    return None if found is None else int(path.of.line[found[0]])
+    hit = pick_point(origin_mm, direction, path.drawn_mm(picture.exaggeration), TOLERANCE_RAD)
+    return None if hit is None else int(path.of.line[hit[0]])
 
 
 def _denser(samples: Array) -> Array:
@@ -140,8 +135,7 @@ def _denser(samples: Array) -> Array:
     return samples[:, first] * (1.0 - part) + samples[:, first + 1] * part
 
 
-def answer(state: AppState, picked: Picked, exaggeration: float) -> PointExplanation:
-    """Explain the error of a picked point."""
+def explain_point(state: AppState, picked: Picked, exaggeration: float) -> PointExplanation:
     scene, model = state.active_scene(), state.scene.model
     stands = {**state.scene.workspace.positions, **state.positions, **picked.at}
     at = {name: stands.get(name, 0.0) for name in model.machine.axes}
@@ -155,44 +149,44 @@ def answer(state: AppState, picked: Picked, exaggeration: float) -> PointExplana
         side = "workpiece" if loop is Loop.WORKPIECE else "tool"
         pose = branch_pose(model, side, coordinates)
         point, shift = transforms.apply(pose, np.asarray(picked.point_mm)), np.zeros(3)
-    found = explain(model, scene.errors, coordinates, state.view(loop), point)
-    drawn_um = found.error_um
+    explanation = explain(model, scene.errors, coordinates, state.view(loop), point)
+    drawn_um = explanation.error_um
     if state.controller is not None:
-        nominal = found.nominal_mm
+        nominal = explanation.nominal_mm
         drawn_um = state.controller.field(coordinates, nominal, scene, loop, nominal).error_um
-    drawn, view = deform(found.nominal_mm + shift, drawn_um, exaggeration), state.view(loop)
-    sure = field_uncertainty(scene, found.error_um, coordinates, view, found.nominal_mm)
-    return PointExplanation(at, loop, found, shift, drawn, drawn_um, sure)
+    drawn, view = deform(explanation.nominal_mm + shift, drawn_um, exaggeration), state.view(loop)
+    error, nominal = explanation.error_um, explanation.nominal_mm
+    uncertainty = field_uncertainty(scene, error, coordinates, view, nominal)
+    return PointExplanation(at, loop, explanation, shift, drawn, drawn_um, uncertainty)
 
 
 def drawn_places(
     state: AppState, points: Sequence[Mapping[str, float]], exaggeration: float
 ) -> Array:
-    """Tell where points of the surface are drawn, [n, 3], mm; all at once, as a drag needs it."""
+    """Compute the places of points of the surface in the drawing, [n, 3], mm."""
     stands = {**state.scene.workspace.positions, **state.positions}
     at = {
-        name: np.array([one.get(name, stands.get(name, 0.0)) for one in points])
+        name: np.array([point.get(name, stands.get(name, 0.0)) for point in points])
         for name in state.scene.machine.axes
     }
-    seen, field = drawn_field(state, at)
-    return deform(seen, field.error_um, exaggeration)
+    drawn_mm, field = drawn_field(state, at)
+    return deform(drawn_mm, field.error_um, exaggeration)
 
 
 def drawn_field(
     state: AppState, at: Coordinates, *, exact: bool = False
 ) -> tuple[Array, ErrorField]:
-    """Tell where points of the surface are drawn without errors, and evaluate them in R, [n]."""
+    """Compute the nominal places of points in the drawing, and their errors in R, [n]."""
     scene, model, loop = state.active_scene(), state.scene.model, state.loop
     nominal = nominal_point(model, Loop.TOOL, at)
-    seen = seen_from_workpiece(model, at, scene.workspace, nominal)
+    drawn_mm = seen_from_workpiece(model, at, scene.workspace, nominal)
     if state.controller is not None:
-        return seen, state.controller.field(at, nominal, scene, loop, nominal)
+        return drawn_mm, state.controller.field(at, nominal, scene, loop, nominal)
     solve = evaluate_exact if exact else evaluate_first_order
-    return seen, solve(model, scene.errors, at, state.view(), nominal)
+    return drawn_mm, solve(model, scene.errors, at, state.view(), nominal)
 
 
 def with_picked(state: AppState, picked: Picked | None) -> AppState:
-    """Ask about a point, or about none; the chosen contribution stays while there is a point."""
     return replace(state, picked=picked, lever=state.lever if picked else "")
 
 
@@ -203,59 +197,60 @@ POINTS = {
     f"{Distance.name}.end": "Click the second point.",
     f"{Distance.name}.corner": "Click the corner of an angle, or stop.",
 }
-"""What asks for the points of a distance, by form, in turn; an empty form waits for a click."""
+"""Prompts for the points of a distance, by form; an empty form waits for a click."""
 
 
-def awaited(state: AppState) -> str:
-    """Give the form of the point that the next click sets; empty where a click asks why."""
+def awaited_form(state: AppState) -> str:
+    """Return the form of the point that the next click sets; empty where it picks a point."""
     page = state.page
     is_open = Distance.name in page.open and page.task == Distance.task and not page.notes
-    return next((one for one in POINTS if is_open and state.forms.get(one) == ""), "")
+    return next((form for form in POINTS if is_open and state.forms.get(form) == ""), "")
 
 
 def with_clicked(state: AppState, picked: Picked) -> AppState:
-    """Take a click on the drawing: a point that is waited for, else one that is asked about."""
-    point = awaited(state)
+    """Set the awaited point of a distance to a clicked one, or pick it."""
+    point = awaited_form(state)
     if not point:
         return with_picked(state, picked)
     if picked.point_mm is not None:
-        return state.noted("a trace was clicked; click a point of the map")
+        return state.noted("expected a click on the map, not on a trace")
     return with_form(state, point, spell_at(picked.at))
 
 
-def measured(picture: LivePicture) -> tuple[DistanceResult, Array, Array] | None:
-    """Measure between the points that were chosen; None where there are not two.
+def measure_distance(picture: LivePicture) -> tuple[DistanceResult, Array, Array] | None:
+    """Evaluate the distance of two selected points; None where they are not set.
 
-    With the result where start, end and corner are drawn, [n, 3], without errors and displaced.
+    Also return the places of start, end and corner in the drawing, [n, 3], nominal and displaced.
     """
-    return None if picture.is_difference else _measured(Identity(picture))
+    return None if picture.is_difference else _measure_distance(Identity(picture))
 
 
-@lru_cache(maxsize=1)  # lines and words of one picture ask; it keeps the picture
-def _measured(of: Identity) -> tuple[DistanceResult, Array, Array] | None:
-    picture: LivePicture = of.thing
-    state, told = picture.drawn_state, option_values(picture.state, Distance.name)
+@lru_cache(maxsize=1)  # lines and labels of one picture use it
+def _measure_distance(of: Identity) -> tuple[DistanceResult, Array, Array] | None:
+    picture: LivePicture = of.target
+    state, option_texts = picture.drawn_state, option_values(picture.state, Distance.name)
     scene = state.active_scene()
     try:
-        asked = replace(read_form(Distance, Distance.options(), told, scene), loop=state.loop)
-        if not (asked.start and asked.end):
+        distance = read_form(Distance, Distance.options(), option_texts, scene)
+        distance = replace(distance, loop=state.loop)
+        if not (distance.start and distance.end):
             return None
-        at = asked.places(scene, asked.corner)
-        seen, field = drawn_field(state, at, exact=asked.exact)
-        found = asked.between(scene, at, field)
-    except WarpspaceError:  # said in its section
+        at = distance.places(scene, distance.corner)
+        drawn_mm, field = drawn_field(state, at, exact=distance.exact)
+        measurement = distance.between(scene, at, field)
+    except WarpspaceError:  # reported in its section
         return None
-    return found, seen, deform(seen, field.error_um, picture.exaggeration)
+    return measurement, drawn_mm, deform(drawn_mm, field.error_um, picture.exaggeration)
 
 
-# --- Where a ray from the eye meets a surface or passes a line ------------------------------------
+# --- Rays from the camera -------------------------------------------------------------------------
 
 
 class Hit(NamedTuple):
-    """Where a ray meets a surface."""
+    """Intersection of a ray with a surface."""
 
     vertices: NDArray[np.intp]  # [3]; vertex numbers of the triangle
-    # [3]; barycentric weights of the point in it; they interpolate anything given per vertex
+    # [3]; barycentric weights of the point in it, for values per vertex
     weights: Array
     distance: float  # along the ray, in lengths of its direction
 
@@ -263,7 +258,7 @@ class Hit(NamedTuple):
 def pick_surface(
     origin: Array, direction: Array, vertices: Array, triangles: NDArray[np.intp]
 ) -> Hit | None:
-    """Find the first triangle, [T, 3], that a ray meets.
+    """Find the first of the triangles, [T, 3], on a ray.
 
     Origin and direction, [3], are in the units of the vertices, [M, 3]; None where the ray misses.
     """
@@ -281,15 +276,15 @@ def pick_surface(
 def pick_point(
     origin: Array, direction: Array, points: Array, tolerance: float
 ) -> tuple[int, float] | None:
-    """Find the point, [M, 3], that a ray passes most closely, as seen from its origin.
+    """Find the point, [M, 3], with the smallest angle to a ray.
 
-    Its number, and its distance along the ray; None where none lies within a tolerance, rad.
+    Return its index and its distance along the ray; None where the angle exceeds a tolerance, rad.
     """
     if len(points) == 0:
         return None
     unit, sight = direction / np.linalg.norm(direction), points - origin
     along = sight @ unit
-    aside = np.linalg.norm(sight - along[:, None] * unit, axis=-1)
-    angle = np.where(along > 0.0, np.arctan2(aside, np.maximum(along, PARALLEL)), np.inf)
+    offset = np.linalg.norm(sight - along[:, None] * unit, axis=-1)
+    angle = np.where(along > 0.0, np.arctan2(offset, np.maximum(along, PARALLEL)), np.inf)
     nearest = int(np.argmin(angle))
     return (nearest, float(along[nearest])) if angle[nearest] <= tolerance else None

@@ -1,6 +1,6 @@
-"""What stands in the box: a part, and paths of a program and of a standard test.
+"""Overlays in the box: a part, and paths of a program and of a standard test.
 
-Responses are kept; a slider move is a product.
+Responses are cached; a slider move is a product.
 """
 
 from collections.abc import Callable, Hashable, Mapping
@@ -33,59 +33,58 @@ from warpspace.parts.workpiece import (
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, Array
 
-AT_LINE = "program.at_line"  # the form that names a line of the program
+AT_LINE = "program.at_line"  # form of the selected line of the program
 MOST_POINTS = 300_000  # of a part, or of the path of a program, that the app draws
 MOST_SITES = 20_000  # places of one test
-PIECE = 20_000  # points that are worked on at once: what lies between needs memory, too
+PIECE = 20_000  # points evaluated at once, which limits the memory of intermediate arrays
 T = TypeVar("T")
-_KEPT: Cache[Any] = Cache(400_000_000)
+_CACHE: Cache[Any] = Cache(400_000_000)
 
 
 @dataclass(frozen=True, eq=False)
 class SceneOverlay(Generic[T]):
-    """Points of a part, or of a path, as they are drawn; numbers of 4 bytes are enough for it."""
+    """Points of a part or of a path in the drawing, in single precision."""
 
     of: T  # in the workpiece frame
-    pose: Array  # [4, 4]; of that frame as drawn
-    at: NDArray[Any]  # points at the corners of a part, [W], or at both ends of pieces of a path
-    coordinates: Mapping[str, Array]  # [n], or one for all: where the axes stand
-    point_mm: Array  # [n, 3]; in R, where they are made
+    pose: Array  # [4, 4]; of that frame in the drawing
+    at: NDArray[Any]  # indices of the corners of a part, [W], or of both ends of path segments
+    coordinates: Mapping[str, Array]  # [n], or one for all: axis positions
+    point_mm: Array  # [n, 3]; in R, where they are cut
     outside: NDArray[np.bool_]  # [n]; beyond the travel
-    turn: Array  # [4, 4] or [n, 4, 4]; from there to where they are drawn
+    turn: Array  # [4, 4] or [n, 4, 4]; from there to the drawing
     nominal_mm: NDArray[Any]  # [n, 3]; as drawn
     response: NDArray[Any]  # [K, n * 3], µm per µm or µrad
     error_um: NDArray[Any]  # [n, 3]; of the tool against the workpiece
 
     def drawn_mm(self, exaggeration: float) -> NDArray[Any]:
-        """Give where the points are, [n, 3], exaggerated."""
         return self.nominal_mm + np.float32(exaggeration * MM_PER_UM) * self.error_um
 
     def with_errors(self, state: AppState) -> "SceneOverlay[T]":
-        """Evaluate it to first order, or what a table of compensation leaves."""
+        """Evaluate the errors to first order, or the residual errors of a compensation table."""
         controller, scene, point = state.controller, state.active_scene(), self.point_mm
         if controller is None:
             amplitudes = np.fromiter(state.active.values(), np.float32, len(state.amplitudes))
             return replace(self, error_um=(amplitudes @ self.response).reshape(-1, 3))
-        kept = _KEPT.get(
+        prepared = _CACHE.get(
             (Identity(controller), Identity(self)),
             lambda: controller.at(self.coordinates, point, scene, Loop.RELATIVE, point),
             lambda found: found.nbytes,
         )
-        error = transforms.rotate(self.turn[..., :3, :3], kept.field(scene.errors).error_um)
+        error = transforms.rotate(self.turn[..., :3, :3], prepared.field(scene.errors).error_um)
         return replace(self, error_um=error.astype(np.float32))
 
 
-def _in_box(
-    state: AppState, own: tuple[Hashable, ...], build: Callable[[Scene], SceneOverlay[T]]
+def _cached_overlay(
+    state: AppState, arguments: tuple[Hashable, ...], build: Callable[[Scene], SceneOverlay[T]]
 ) -> SceneOverlay[T] | None:
-    """Give something with the errors of a state; None where it cannot be made."""
-    key = Identity(state.scene), tuple(state.positions.items()), state.placed, own
+    """Build an overlay, or return it from the cache, with errors; None where it cannot be built."""
+    key = Identity(state.scene), tuple(state.positions.items()), state.placed, arguments
     try:
-        found: SceneOverlay[T] = _KEPT.get(
+        overlay: SceneOverlay[T] = _CACHE.get(
             key, lambda: build(state.standing), lambda found: found.response.nbytes
         )
-        return found.with_errors(state)
-    except WarpspaceError:  # its section says it
+        return overlay.with_errors(state)
+    except WarpspaceError:  # reported in its section
         return None
 
 
@@ -99,8 +98,8 @@ def _respond(scene: Scene, of: T, made: ActualPoints, at: NDArray[Any]) -> Scene
     for rows in np.array_split(np.arange(count), -(-count // PIECE) or 1):
         response[:, rows] = point_basis(scene, made, rows=rows).position @ pose[:3, :3].T
     nominal = transforms.apply(pose, made.point_mm).astype(np.float32)
-    here = branch_pose(scene.model, "workpiece", made.coordinates)
-    point, turn = transforms.apply(here, made.point_mm), (pose @ transforms.inverse(here))
+    made_pose = branch_pose(scene.model, "workpiece", made.coordinates)
+    point, turn = transforms.apply(made_pose, made.point_mm), (pose @ transforms.inverse(made_pose))
     flat = response.reshape(len(keys), -1)
     return SceneOverlay(
         of, pose, at, made.coordinates, point, made.outside, turn, nominal, flat, nominal
@@ -110,25 +109,25 @@ def _respond(scene: Scene, of: T, made: ActualPoints, at: NDArray[Any]) -> Scene
 # --- A part ---------------------------------------------------------------------------------------
 
 
-def part_in_box(state: AppState) -> SceneOverlay[Workpiece] | None:
-    """Give the part as it is cut; None where there is none, or it cannot be clamped."""
-    mesh, wanted = state.part.mesh, state.part.place
+def part_overlay(state: AppState) -> SceneOverlay[Workpiece] | None:
+    """Build the part as it is cut; None where there is none, or it cannot be placed."""
+    mesh, place = state.part.mesh, state.part.place
     if mesh is None or not state.part.shown:
         return None
 
     def clamp(scene: Scene) -> SceneOverlay[Workpiece]:
-        part = place_workpiece(mesh, scene, wanted)
+        part = place_workpiece(mesh, scene, place)
         return _respond(
             scene, part, evaluate_points(scene, part.vertices_mm), part.corners.corner_of
         )
 
-    return _in_box(state, (Identity(mesh), wanted), clamp)
+    return _cached_overlay(state, (Identity(mesh), place), clamp)
 
 
 def moved_place(part: Workpiece, stand: Array) -> tuple[float, ...]:
-    """Give the place of a part whose middle is to stand so, [4, 4], in the workpiece frame."""
-    own = transforms.placed(part.place[:3], part.place[3:])
-    pose = stand @ transforms.translation(-part.middle_mm) @ own
+    """Compute the placement of a part from a pose of its middle, [4, 4], in the workpiece frame."""
+    placement = transforms.placed(part.place[:3], part.place[3:])
+    pose = stand @ transforms.translation(-part.middle_mm) @ placement
     angles = transforms.roll_pitch_yaw_deg(pose[:3, :3])
     return tuple((np.round([*pose[:3, 3], *angles], 3) + 0.0).tolist())
 
@@ -136,21 +135,21 @@ def moved_place(part: Workpiece, stand: Array) -> tuple[float, ...]:
 # --- Paths ----------------------------------------------------------------------------------------
 
 
-def path_in_box(state: AppState) -> SceneOverlay[ToolPath] | None:
-    """Give the path of the program; None where there is none, or it cannot be followed."""
-    text, told = state.part.program, option_values(state, Program.name) | {"at_line": ""}
+def path_overlay(state: AppState) -> SceneOverlay[ToolPath] | None:
+    """Build the path of the program; None where there is none, or it cannot be traced."""
+    text, option_texts = state.part.program, option_values(state, Program.name) | {"at_line": ""}
     if text is None:
         return None
 
     def trace(scene: Scene) -> SceneOverlay[ToolPath]:
-        asked = read_form(Program, Program.options(), told, scene)
-        read = read_program(scene, text.splitlines(), asked, state.part.program_name)
+        program = read_form(Program, Program.options(), option_texts, scene)
+        read = read_program(scene, text.splitlines(), program, state.part.program_name)
         path = trace_program(read)
         made = ActualPoints(path.tip_mm, path.coordinates, path.error_um, path.outside)
         ends = np.flatnonzero(path.step_mm.any(axis=1))
         return _respond(scene, path, made, np.stack([ends - 1, ends], axis=1))
 
-    return _in_box(state, (text, *sorted(told.items())), trace)
+    return _cached_overlay(state, (text, *sorted(option_texts.items())), trace)
 
 
 def chosen_test(state: AppState) -> type[BenchTest] | None:
@@ -159,7 +158,6 @@ def chosen_test(state: AppState) -> type[BenchTest] | None:
 
 
 def plan_test(test: BenchTest, scene: Scene) -> BenchPlan:
-    """Lay the path of a test on a machine."""
     plan = test.plan(scene)
     if len(plan.point_mm) > MOST_SITES:
         raise OptionError(
@@ -168,14 +166,14 @@ def plan_test(test: BenchTest, scene: Scene) -> BenchPlan:
     return plan
 
 
-def bench_in_box(state: AppState) -> SceneOverlay[type[BenchTest]] | None:
-    """Give the path of the chosen test; None where none is drawn, or it cannot be run."""
-    kind, told = chosen_test(state), option_values(state, TEST)
-    if kind is None or told.get("path") == "0":
+def bench_overlay(state: AppState) -> SceneOverlay[type[BenchTest]] | None:
+    """Build the path of the selected test; None where none is drawn, or it cannot be run."""
+    kind, option_texts = chosen_test(state), option_values(state, TEST)
+    if kind is None or option_texts.get("path") == "0":
         return None
 
     def lay(scene: Scene) -> SceneOverlay[type[BenchTest]]:
-        plan = plan_test(read_form(kind, kind.settings(), told, scene), scene)
+        plan = plan_test(read_form(kind, kind.settings(), option_texts, scene), scene)
         at, point = plan.coordinates, plan.point_mm
         nominal = seen_from_workpiece(scene.model, at, scene.workspace, point)
         response = respond_sites(scene, plan, scene.parameter_keys).reshape(-1, point.size)
@@ -185,5 +183,5 @@ def bench_in_box(state: AppState) -> SceneOverlay[type[BenchTest]] | None:
             kind, still, pieces, at, point, inside, still, nominal, response, nominal
         )
 
-    without = replace(state, controller=None)  # a test is of the machine as it is
-    return _in_box(without, (kind, *sorted(told.items())), lay)
+    without = replace(state, controller=None)  # a test is of the uncompensated machine
+    return _cached_overlay(without, (kind, *sorted(option_texts.items())), lay)

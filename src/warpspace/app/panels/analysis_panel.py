@@ -21,7 +21,7 @@ from warpspace.analysis.registry import Entry
 from warpspace.app.browser.html import EMPTY, button, join, number, rows, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
-from warpspace.app.evaluation.cache import taken_turn
+from warpspace.app.evaluation.cache import exclusive_work
 from warpspace.app.evaluation.compare import (
     applied,
     plain_state,
@@ -106,7 +106,7 @@ class AnalysisPanel(Section):
     def defaults(self, state: AppState) -> Mapping[str, str]:
         """Return values of options that follow the state unless they are set."""
         state_values = {"loop": str(state.loop), "limit_um": f"{state.specification.limit_um:g}"}
-        state_values["placed"] = str(int(state.seen[1]))
+        state_values["placed"] = str(int(state.view_key[1]))
         if state.picked is not None:
             state_values["at"] = spell_at(state.picked.at)
         return {o.name: state_values[o.name] for o in self.options() if o.name in state_values}
@@ -276,7 +276,7 @@ class AnalysisPanel(Section):
             return
 
         def compute(job: Job) -> AnalysisOutcome:
-            with taken_turn(lambda: job.report_progress(job.share)):
+            with exclusive_work(lambda: job.report_progress(job.share)):
                 start_s = time.monotonic()
                 result = analysis.run_all(scenes, job.report_progress)
                 took_s = time.monotonic() - start_s
@@ -347,7 +347,7 @@ def _change_html(state: AppState, change: Change) -> Markup:
             moved.append((-abs(b - a), line))
     steps = [line for _, line in sorted(moved)] or [change.label]
     lines = [tag("div", tag("b", line)) for line in steps[:MOST_STEPS]]
-    n_hidden= len(steps) - MOST_STEPS
+    n_hidden = len(steps) - MOST_STEPS
     if n_hidden > 0:
         lines.append(tag("div", f"and {n_hidden} more", class_="ws-quiet"))
     try:

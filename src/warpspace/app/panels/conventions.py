@@ -265,7 +265,7 @@ class ConventionsSection(Section):
         state = picture.state
         return (
             Identity(state.origin), Identity(state.scene), tuple(state.active.items()),
-            tuple(state.positions.items()), state.seen, state.nodes,
+            tuple(state.positions.items()), state.view_key, state.nodes,
             Identity(state.picked),
         )  # fmt: skip
 

@@ -205,7 +205,7 @@ def _sampled(state: AppState) -> ResultKey:
     specification = state.specification
     positions = tuple(state.positions.items()) if state.loop is Loop.RELATIVE else ()
     shape = specification.over, specification.distribution
-    return (Identity(state.scene), state.seen, *shape, positions)
+    return (Identity(state.scene), state.view_key, *shape, positions)
 
 
 def sample_machines(state: AppState) -> Ensemble:

@@ -315,7 +315,7 @@ class ErrorsPanel(Panel):
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         state = picture.state
-        inputs = (Identity(state.scene), state.seen, tuple(state.positions.items()))
+        inputs = (Identity(state.scene), state.view_key, tuple(state.positions.items()))
         gains = self._gains.get(inputs, lambda: _gains(picture, state))
         ranking = self._rank(state, gains)
         listed = (ranking.order, ranking.used, bool(state.changed_keys))

@@ -26,9 +26,9 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import (
     POINTS,
     PointExplanation,
-    answer,
-    awaited,
-    measured,
+    awaited_form,
+    explain_point,
+    measure_distance,
     pick_worst,
     with_picked,
 )
@@ -92,7 +92,7 @@ class WorstPanel(Section):
     def _explain(self, picture: LivePicture) -> PointExplanation:
         if self._explanation is None or self._explanation[0] is not picture:
             picked = picture.state.picked or pick_worst(picture)
-            self._explanation = picture, answer(picture.drawn_state, picked, picture.exaggeration)
+            self._explanation = picture, explain_point(picture.drawn_state, picked, picture.exaggeration)
         return self._explanation[1]
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -216,7 +216,8 @@ class DistancePanel(AnalysisPanel):
         return (*super().body_dependencies(picture), id(picture))
 
     def before_result(self, state: AppState) -> Markup:
-        point, drawn = awaited(state), self.context.picture and measured(self.context.picture)
+        point, drawn = (
+            awaited_form(state), self.context.picture and measure_distance(self.context.picture),)
         hint = "Click two points of the map; a third one gives an angle"
         buttons = [button("Pick points", f"{self.name}:pick", kind="main", hint=hint)]
         if point:

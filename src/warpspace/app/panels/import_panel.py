@@ -120,7 +120,7 @@ class ImportResult(Result):
         for note in (*errors.assumed, *errors.notes, *self.imported.notes):
             if not note.startswith("replaced: "):
                 yield _without_options(note.replace(unchanged, "unchanged:"))
-        n_hidden= len(errors.series) - MOST_CURVES
+        n_hidden = len(errors.series) - MOST_CURVES
         if n_hidden > 0:
             yield f"{n_hidden} more curves are not displayed"
 
@@ -173,7 +173,10 @@ class ImportPanel(FilesPanel):
         recognised = _recognised(files)
         first = recognised.title if recognised is not None else "none, select one"
         options["format"] = replace(
-            options["format"], choices=tuple(names), choice_labels=names, unset=f"recognised: {first}"
+            options["format"],
+            choices=tuple(names),
+            choice_labels=names,
+            unset=f"recognised: {first}",
         )
         chosen = self.values(state).get("format")
         kind = registry.find_format(chosen) if chosen in names else recognised

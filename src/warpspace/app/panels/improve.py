@@ -50,9 +50,7 @@ class AdjustPanel(AnalysisPanel):
 
     def options(self) -> Sequence[Option]:
         changes = {"default": None, "choices": ("all",), "choice_labels": {"all": "any error"}}
-        return [
-            replace(o, **changes) if o.name == "adjustable" else o for o in super().options()
-        ]
+        return [replace(o, **changes) if o.name == "adjustable" else o for o in super().options()]
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), "objective": Objective.MAX}

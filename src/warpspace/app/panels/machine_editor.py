@@ -25,7 +25,12 @@ from warpspace.app.browser.html import (
 )
 from warpspace.app.evaluation import machine_edits
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine_bodies import HERE, chosen_trace, played_axis, standing
+from warpspace.app.evaluation.machine_bodies import (
+    NO_POSITIONS,
+    chosen_trace,
+    played_axis,
+    standing,
+)
 from warpspace.app.panels.block_html import block_html
 from warpspace.app.panels.form_controls import setting
 from warpspace.app.panels.panel import Context, Dialog, Section
@@ -98,7 +103,7 @@ class RotarySection(Section):
 
     def body(self, picture: LivePicture) -> Markup:
         state, stage = picture.state, self.context.stage
-        axis, playing, position = played_axis(state), False, HERE
+        axis, playing, position = played_axis(state), False, NO_POSITIONS
         if axis is None:
             return tag("p", "This machine has no rotary axis.", class_="ws-quiet")
         if stage is not None:

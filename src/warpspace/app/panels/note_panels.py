@@ -19,7 +19,7 @@ from warpspace.app.documents.offline_page import step_words
 from warpspace.app.documents.scene_file import reopened, view_of
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.point_explanation import answer, pick_worst, with_picked
+from warpspace.app.evaluation.point_explanation import explain_point, pick_worst, with_picked
 from warpspace.app.panels.form_controls import setting
 from warpspace.app.panels.panel import Context, Panel, Refresh, actions
 from warpspace.app.state.app_state import AppState, Picked
@@ -128,7 +128,7 @@ class NotesPanel(Panel):
         if place != "point" or picture is None or picture.is_difference:
             return {}, None
         picked = state.picked or pick_worst(picture)
-        at = answer(state, picked, 1.0).at
+        at = explain_point(state, picked, 1.0).at
         on = picked.point_mm and NoteAnchor(str(picked.loop or state.loop), picked.point_mm)
         return at, on or None
 

@@ -11,13 +11,13 @@ from markupsafe import Markup
 from warpspace.app.browser.html import EMPTY, fill, join, menu, tag, text_box
 from warpspace.app.browser.viser_private import queued
 from warpspace.app.documents.legend import (
-    kept_words,
     legend_html,
     numbers_words,
     order_conditions,
     part_html,
     place_words,
     subject_words,
+    within_limit_words,
 )
 from warpspace.app.drawing.camera import read_room
 from warpspace.app.drawing.labels import Label, axis_labels, note_labels, point_labels
@@ -67,7 +67,10 @@ class LegendPanel(Panel):
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         limit_menu = EMPTY
         if not picture.is_difference:
-            (share, is_pass), limit = kept_words(picture), picture.state.specification.limit_um
+            (share, is_pass), limit = (
+                within_limit_words(picture),
+                picture.state.specification.limit_um,
+            )
             box = text_box("state:set.specification.limit_um", f"{limit:g}", size="short",
                            label="Limit", id="ws-limit")  # fmt: skip
             body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
@@ -158,7 +161,7 @@ def _scene(point_mm: Array) -> list[float]:
 
 @lru_cache(maxsize=32)
 def _labels_json(labels: Identity) -> list[dict[str, Any]]:
-    return list(map(_label_json, labels.thing))
+    return list(map(_label_json, labels.target))
 
 
 def _label_json(label: Label) -> dict[str, Any]:

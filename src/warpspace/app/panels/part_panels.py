@@ -16,7 +16,7 @@ from warpspace.app.browser.html import EMPTY, button, join, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents.transfers import IN_BOX, upload_text
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.scene_overlays import AT_LINE, moved_place, part_in_box
+from warpspace.app.evaluation.scene_overlays import AT_LINE, moved_place, part_overlay
 from warpspace.app.panels.analysis_panel import ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.form_controls import setting
@@ -128,7 +128,7 @@ class PartPanel(SceneOverlayPanel):
         return html.rows(verdicts) + super().result_html(result)
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
-        part = part_in_box(state) if action == "turn" and value in ("x", "y", "z") else None
+        part = part_overlay(state) if action == "turn" and value in ("x", "y", "z") else None
         if part is not None:
             turn = transforms.placed(part.of.middle_mm, 90.0 * np.eye(3)["xyz".index(value)])
             return replace(state, part=replace(state.part, place=moved_place(part.of, turn)))
@@ -175,7 +175,8 @@ class ProgramPanel(SceneOverlayPanel):
         *tables, worst = (block for block in result.blocks() if isinstance(block, Table))
         line, *columns = worst.columns
         columns = (
-            replace(block, shows=block.heading in ("|E|", "largest contributions")) for block in columns
+            replace(block, shows=block.heading in ("|E|", "largest contributions"))
+            for block in columns
         )
         narrow = replace(worst, columns=(replace(line, form=link), *columns))
         return block_html(narrow) + details_html((*tables, worst))

@@ -26,7 +26,7 @@ from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.panels.conventions import with_travel
 from warpspace.app.panels.form_controls import setting
 from warpspace.app.panels.panel import Panel, Refresh
-from warpspace.app.state.app_state import COMPONENT_NAMES, NOBODY, SHOWN, AppState, Side
+from warpspace.app.state.app_state import COMPARISON_VIEWS, COMPONENT_NAMES, NOBODY, AppState, Side
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import QUANTITIES, SURFACES, slice_positions
 from warpspace.app.state.tree import leaves, put, spell
@@ -196,7 +196,7 @@ class ComparePanel(Panel):
                            hint="Later changes belong to B"))  # fmt: skip
         if compared is not None:
             body += [setting(state, "comparison.ghost"), comparison_html(compared)]
-        label = "compare" if compared is None else SHOWN[compared.shown]
+        label = "compare" if compared is None else COMPARISON_VIEWS[compared.view]
         return {"compared": "" if compared is None else _sides(compared),
                 "compare": menu(label, join(body), key="compare", kind="up wide",
                                 hint="Compare two scenes, or errors before and after")}  # fmt: skip
@@ -227,10 +227,10 @@ def _sides(compared: Compared) -> Markup:
     difference = compared.refused or "Difference of A and B at each node, with its own colours"
     hints = {"a": compared.titles[0], "b": compared.titles[1], "difference": difference}
     choices: list[Markup] = []
-    for key, label in SHOWN.items():
+    for key, label in COMPARISON_VIEWS.items():
         is_refused = bool(compared.refused) and key == "difference"
         choices.append(button(label, "state:set.comparison.shown", key, kind="chip",
-                              hint=hints[key], pressed=compared.shown == key,
+                              hint=hints[key], pressed=compared.view == key,
                               disabled=is_refused))  # fmt: skip
     leave = button("✕", "compare:leave", kind="chip", hint="End the comparison",
                    aria_label="End the comparison")  # fmt: skip

@@ -1,1 +1,1 @@
-"""Starts viser and gives each browser tab its session."""
+"""The viser server and the sessions of its browser tabs."""

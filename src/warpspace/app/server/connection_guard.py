@@ -1,4 +1,4 @@
-"""Puts the app's checks and limits around viser's server: each request, connection and message."""
+"""Checks and limits around viser's server, for each request, connection and message."""
 
 import asyncio
 import logging
@@ -20,7 +20,7 @@ logger = logging.getLogger(__name__)
 HEADERS = {
     "X-Frame-Options": "DENY",
     # viser's page is one file of scripts and styles; it unpacks itself, runs the scripts it is sent
-    # and starts workers of its own. What another server sends would run as the app's own.
+    # and starts workers. Scripts of another server would run as the app's own.
     "Content-Security-Policy": "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'"
     " blob:; worker-src 'self' blob:; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:;"
     " font-src 'self' data:; connect-src 'self' data: blob:; object-src 'none'; base-uri 'none';"
@@ -28,14 +28,14 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "same-origin",
 }
-"""Sent with each answer: no other page may show the app inside itself, or learn its address."""
+"""Sent with each response: no other page may embed the app or learn its address."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """How much is taken at once."""
+    """Limits of one server."""
 
-    sessions: int = 64  # tabs that are open at the same time
+    sessions: int = 64  # open tabs
     # largest message of a page: a picture of the view. A file has 15.5 MB at most.
     message_bytes: int = 16 * 2**20
     messages_per_second: float = 400.0  # of one connection, on average; a page sends 50
@@ -43,8 +43,8 @@ class Limits:
 
 
 LIMITS = Limits()
-FAREWELL_S = 0.5  # how long a page may take to close its connection; some read nothing any more
-MOST_EARLY = 4  # messages of a page that are kept until its session is there
+FAREWELL_S = 0.5  # for a page to close its connection; some do not read any more
+MOST_EARLY = 4  # messages of a page that are stored until its session exists
 
 
 class Rate:
@@ -57,7 +57,7 @@ class Rate:
         self._left, self._last = float(burst), clock()
 
     def take(self) -> bool:
-        """Count a message; False where it is one too many."""
+        """Count a message; False above the limit."""
         now = self._clock()
         self._left = min(self._burst, self._left + (now - self._last) * self._per_second)
         self._last = now
@@ -70,30 +70,29 @@ class Rate:
 class Guard:
     """Checks each request before viser answers it, and limits each connection."""
 
-    def __init__(self, doors: RequestPolicy, limits: Limits = LIMITS) -> None:
-        self.limits, self._doors = limits, doors
+    def __init__(self, policy: RequestPolicy, limits: Limits = LIMITS) -> None:
+        self.limits, self._policy = limits, policy
         self._logged: set[str] = set()
 
-    def warn(self, kind: str, text: str, who: object) -> None:
-        """Log a refusal, if it is the first of its kind: nobody can fill the log."""
+    def warn(self, kind: str, text: str, client: object) -> None:
+        """Log the first refusal of its kind, so that no client can fill the log."""
         if kind not in self._logged:
             self._logged.add(kind)
-            logger.warning("refused %s: %s (further ones are not logged)", who, text)
+            logger.warning("refused %s: %s (further ones are not logged)", client, text)
 
-    def options(self, theirs: dict[str, Any]) -> dict[str, Any]:
-        """Give the options that a server of `websockets` starts with, from those viser has."""
+    def options(self, viser_options: dict[str, Any]) -> dict[str, Any]:
 
         def process_request(connection: ServerConnection, request: Request) -> Any:
             refusal = self._check(connection, request)
             if refusal is None:
-                return theirs["process_request"](connection, request)
+                return viser_options["process_request"](connection, request)
             self.warn(refusal.kind, refusal.text, connection.remote_address)
             return connection.respond(refusal.status, refusal.text + "\n")
 
         def process_response(_: ServerConnection, request: Request, response: Response) -> None:
             response.headers.update(HEADERS)
             if response.status_code < HTTPStatus.BAD_REQUEST:
-                cookie = self._doors.cookie(request)
+                cookie = self._policy.cookie(request)
                 if cookie is not None:
                     response.headers["Set-Cookie"] = cookie
 
@@ -103,7 +102,7 @@ class Guard:
             return connection
 
         return {
-            **theirs,
+            **viser_options,
             "process_request": process_request,
             "process_response": process_response,
             "create_connection": create_connection,
@@ -112,22 +111,21 @@ class Guard:
         }
 
     def _check(self, connection: ServerConnection, request: Request) -> Refusal | None:
-        refusal = self._doors.check(request, plain_address(str(connection.local_address[0])))
-        most = self.limits.sessions
-        if refusal is not None or len(connection.server.connections) < most:
+        refusal = self._policy.check(request, plain_address(str(connection.local_address[0])))
+        limit = self.limits.sessions
+        if refusal is not None or len(connection.server.connections) < limit:
             return refusal
         return Refusal(
             "sessions",
-            f"{most} tabs have the app open, which is all it takes at once: close one and try"
-            " again.",
+            f"{limit} tabs are open, which is the limit: close one and try again.",
             HTTPStatus.SERVICE_UNAVAILABLE,
         )
 
 
 class TabConnection(ServerConnection):
-    """A websocket that reads what a page says, and is closed with a reason when that is too much.
+    """A websocket that validates the messages of a page and closes above the message rate.
 
-    What the page's own scripts say goes to its session; viser gets the rest of what may be said.
+    Events of the page's own scripts go to its session, all other valid messages to viser.
     """
 
     def start(self, guard: Guard) -> None:
@@ -138,27 +136,26 @@ class TabConnection(ServerConnection):
         self._take: Callable[[Events], None] | None = None
 
     def listen(self, take: Callable[[Events], None]) -> None:
-        """Have somebody take what the page's scripts say, and have said so far."""
+        """Pass events of the page's scripts to a callback, including those received so far."""
         self._take = take
-        for said in self._early:
-            take(said)
+        for events in self._early:
+            take(events)
 
     async def recv(self, decode: bool | None = None) -> Any:
-        """Receive the next message for viser."""
         while True:
             try:
                 raw = await super().recv(decode)
             except ConnectionClosed as closed:
                 if closed.sent is not None and closed.sent.code == CloseCode.MESSAGE_TOO_BIG:
-                    words = f"a message too large, {closed.sent}"
-                    self._guard.warn("size", words, self.remote_address)
+                    reason = f"a message too large, {closed.sent}"
+                    self._guard.warn("size", reason, self.remote_address)
                 raise
             if self._closing is not None:
                 continue  # until the other side has closed as well
             if not self._rate.take():
-                words = f"more than {self._guard.limits.messages_per_second:g} messages a second"
-                self._guard.warn("rate", words, self.remote_address)
-                closing = self.close(CloseCode.POLICY_VIOLATION, words)
+                reason = f"more than {self._guard.limits.messages_per_second:g} messages a second"
+                self._guard.warn("rate", reason, self.remote_address)
+                closing = self.close(CloseCode.POLICY_VIOLATION, reason)
                 self._closing = asyncio.ensure_future(closing)
                 continue
             message = read_message(raw)

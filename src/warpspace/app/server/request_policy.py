@@ -1,4 +1,4 @@
-"""Which requests the app answers: its own pages on the hosts it serves, with the right token."""
+"""Requests that the app answers: of its own pages, to the hosts it serves, with the token."""
 
 import hmac
 import ipaddress
@@ -20,18 +20,18 @@ _AUTHORITY = re.compile(r"(?:\[([0-9A-Fa-f:.]+)\]|([A-Za-z0-9._-]+))(?::(\d{1,5}
 _ORIGIN = re.compile(r"(https?)://(.+)", re.IGNORECASE)
 _DEFAULT_PORTS = {"http": 80, "https": 443}
 _ELSEWHERE = ("websocket", "playbackPath")
-"""Words of an address that make viser's page talk to another server, whose scripts it runs."""
+"""Query parameters that connect viser's page to another server, whose scripts it runs."""
 
 
 @dataclass(frozen=True)
 class Access:
-    """Who may use the app, as the command line says it."""
+    """Access to the app, as given on the command line."""
 
-    # further names, with a port where it is not the usual one, that a proxy serves the app under
+    # names under which a proxy serves the app, with a port unless it is the default one
     allow_hosts: tuple[str, ...] = ()
-    # asked for; by default a random one where other machines can reach the app, else none
+    # required; by default a random one where other machines can reach the app, else none
     token: str | None = None
-    no_token: bool = False  # whether nothing is asked for, whoever can reach the app
+    no_token: bool = False  # no token is required, whoever can reach the app
 
     def choose_token(self, *, local: bool) -> str | None:
         if self.token is None:
@@ -45,22 +45,21 @@ class Access:
 
 @dataclass(frozen=True)
 class HostPort:
-    """A host and a port; None is the usual port of the scheme."""
+    """A host and a port; None is the default port of the scheme."""
 
     host: str
     port: int | None
 
     def usual(self, scheme: str) -> "HostPort":
-        """Leave out the port where the scheme has it by itself."""
         return HostPort(self.host, None if self.port == _DEFAULT_PORTS[scheme] else self.port)
 
 
 def read_place(text: str) -> HostPort | None:
-    """Read `host`, `host:port` or `[address]:port`; None where it is none of them."""
-    found = _AUTHORITY.fullmatch(text)
-    if found is None:
+    """Parse `host`, `host:port` or `[address]:port`; None for other texts."""
+    match = _AUTHORITY.fullmatch(text)
+    if match is None:
         return None
-    literal, name, port = found.groups()
+    literal, name, port = match.groups()
     try:
         host = plain_address(literal or name)
     except ValueError:
@@ -71,7 +70,7 @@ def read_place(text: str) -> HostPort | None:
 
 
 def plain_address(text: str) -> str:
-    """Spell an address in the one way it is compared in."""
+    """Return an address in the notation used for comparisons."""
     address = ipaddress.ip_address(text.partition("%")[0])
     mapped = getattr(address, "ipv4_mapped", None)
     return str(mapped or address)
@@ -79,7 +78,7 @@ def plain_address(text: str) -> str:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why a request is refused: `kind` is logged once, `text` is what the page says."""
+    """Reason for a refused request: `kind` is logged once, `text` stands on the page."""
 
     kind: str
     text: str
@@ -87,11 +86,11 @@ class Refusal:
 
 
 class RequestPolicy:
-    """Tells which requests for a page or a websocket are answered.
+    """Check of requests for a page or a websocket.
 
     Any page of the web can send requests to a server on this machine. Its browser names the page in
-    `Origin`, and in `Host` the name the server was asked under, which is a foreign one where a
-    name was made to point here (DNS rebinding). Programs other than browsers send no `Origin`.
+    `Origin`, and the requested server in `Host`, which is a foreign name where that name was
+    made to point here (DNS rebinding). Programs other than browsers send no `Origin`.
     """
 
     def __init__(
@@ -109,18 +108,18 @@ class RequestPolicy:
         self._cookie = f"{COOKIE}{port}"
         self._pass = hmac.new((token or "").encode(), b"warpspace cookie", "sha256").hexdigest()
 
-    def check(self, asked: Request, arrived_at: str) -> Refusal | None:
-        """Tell why a request that came in by an address is refused; None where it is answered."""
-        hosts, origins = (asked.headers.get_all(name) for name in ("Host", "Origin"))
+    def check(self, request: Request, arrived_at: str) -> Refusal | None:
+        """Return the reason for refusing a request to an address; None where it is answered."""
+        hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
         place = read_place(hosts[0]) if len(hosts) == 1 else None
         served = place is not None and (
             place.host in self._hosts or (self._everywhere and place.host == arrived_at)
         )
         if place is None or not served:
-            found = ", ".join(hosts) or "none"
+            requested = ", ".join(hosts) or "none"
             return Refusal(
                 "host",
-                f"This app does not serve the host {found[:200]!r}. If a proxy does,"
+                f"This app does not serve the host {requested[:200]!r}. If a proxy does,"
                 " start the app with --allow-host NAME.",
             )
         if origins and not (len(origins) == 1 and self._is_own(origins[0], place)):
@@ -129,47 +128,47 @@ class RequestPolicy:
                 f"Only the app's own page may use it, not one of {origins[0][:200]!r}. If a"
                 " proxy serves the app there, start it with --allow-host NAME.",
             )
-        if not all(self._is_own(url, place) for url in _words(asked, *_ELSEWHERE)):
+        if not all(self._is_own(url, place) for url in _query_values(request, *_ELSEWHERE)):
             return Refusal(
-                "elsewhere", "The link leads the page to another server; leave that out."
+                "elsewhere", "The link connects the page to another server; remove that parameter."
             )
-        if not (self._has_token(asked) or self._has_cookie(asked)):
+        if not (self._has_token(request) or self._has_cookie(request)):
             return Refusal(
                 "token",
-                "This app asks for a token: open the link that was printed where it was started"
+                "This app requires a token: open the link printed where it was started"
                 " (…/?token=…), and allow its cookie.",
             )
         return None
 
-    def cookie(self, asked: Request) -> str | None:
-        """Give the cookie that spares a page the token from now on; its websocket has no other."""
-        if self._token is None or not self._has_token(asked):
+    def cookie(self, request: Request) -> str | None:
+        """Return the cookie that replaces the token from now on; a websocket has no other."""
+        if self._token is None or not self._has_token(request):
             return None
         return f"{self._cookie}={self._pass}; Path=/; HttpOnly; SameSite=Strict"
 
-    def _has_token(self, asked: Request) -> bool:
+    def _has_token(self, request: Request) -> bool:
         token = self._token
-        return token is None or any(_is(word, token) for word in _words(asked, "token"))
+        return token is None or any(_is(word, token) for word in _query_values(request, "token"))
 
-    def _has_cookie(self, asked: Request) -> bool:
+    def _has_cookie(self, request: Request) -> bool:
         pairs = (
             pair.strip().partition("=")
-            for header in asked.headers.get_all("Cookie")
+            for header in request.headers.get_all("Cookie")
             for pair in header.split(";")
         )
         return any(_is(value, self._pass) for name, _, value in pairs if name.startswith(COOKIE))
 
     def _is_own(self, url: str, place: HostPort) -> bool:
-        found = _ORIGIN.fullmatch(re.sub(r"\Aws", "http", url))
-        own = None if found is None else read_place(found[2].partition("/")[0])
-        if found is None or own is None:
+        match = _ORIGIN.fullmatch(re.sub(r"\Aws", "http", url))
+        origin = None if match is None else read_place(match[2].partition("/")[0])
+        if match is None or origin is None:
             return False
-        scheme = found[1].lower()
-        return own.usual(scheme) in {at.usual(scheme) for at in (place, *self._allowed)}
+        scheme = match[1].lower()
+        return origin.usual(scheme) in {at.usual(scheme) for at in (place, *self._allowed)}
 
 
-def _words(asked: Request, *names: str) -> list[str]:
-    query = asked.path.partition("?")[2]
+def _query_values(request: Request, *names: str) -> list[str]:
+    query = request.path.partition("?")[2]
     return [value for key, value in parse_qsl(query, keep_blank_values=True) if key in names]
 
 

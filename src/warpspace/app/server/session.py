@@ -1,16 +1,16 @@
-"""One browser tab: the one thread that joins its page, its state and its drawing.
+"""The session of one browser tab: a thread that connects its page, its state and its drawing.
 
-The way of a slider move:
+The path of a slider move:
 
-1. `browser/page.js` sends an event, the tab's connection (`server/guard.py`) queues it;
-2. here, `_follow`: the event's part (`tasks/parts.py`) says what it does to the state,
-3. which is applied (`state/store.py`) and
-4. evaluated (`evaluation/evaluate.py`);
-5. all that shows the picture follows (`Display`): layers (`drawing/`) change viser's
-   nodes in place, parts write pieces of HTML; what has not changed is not sent.
+1. `browser/page.js` sends an event; the connection of the tab (`server/connection_guard.py`)
+   queues it;
+2. `Session._follow` passes it to its panel (`panels/`), which returns the changed state;
+3. the state is stored (`state/store.py`) and
+4. evaluated (`evaluation/live_model.py`);
+5. `Display` updates what shows the picture: layers (`drawing/`) change viser's nodes in place,
+   panels render HTML; unchanged parts are not sent.
 
-The session reads the last position of a slider when it gets there, so that is always what is shown,
-however fast the slider was moved.
+The session evaluates the latest position of a slider only, however fast it is moved.
 """
 
 import logging
@@ -21,7 +21,7 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -37,184 +37,135 @@ from warpspace.app.evaluation.point_explanation import pick, pick_line, with_cli
 from warpspace.app.panels.note_panels import StoryPanel
 from warpspace.app.panels.overlay import PointerPanel, Tabs
 from warpspace.app.panels.page_panels import build_panels
-from warpspace.app.panels.panel import PAUSE_S, Context, Dialog, Panel, Refresh
+from warpspace.app.panels.panel import Context, Dialog, Panel, Refresh
+from warpspace.app.server.refresh_scheduler import RefreshScheduler
 from warpspace.app.server.tab_keeper import TabKeeper, TabRecord, new_token
-from warpspace.app.state.app_state import AppState, Comparison, PageLook, PartLook
+from warpspace.app.state.app_state import AppState, Comparison, PartLook
 from warpspace.app.state.look import Look
-from warpspace.app.state.store import Mark, StateStore
+from warpspace.app.state.store import Checkpoint, StateStore
 from warpspace.exceptions import WarpspaceError
 
-OFTEN_S = 0.4  # between two writings of what follows often
-LONGEST_PAUSE_S = 3.0  # what follows in a pause lags no longer than this while a slider is dragged
-REST_S = 0.5  # pause after which the slowest parts follow; a drag does not pay for them
 Guarded = Callable[[object, Callable[[], object]], None]
-"""Does something of a part or a layer, and takes in what that raises."""
+"""Runs a step of a panel or a layer and handles its exceptions."""
 
 
 class Display:
-    """Layers and parts of one tab; none at first."""
+    """Layers and panels of one tab; none at first."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
+        self._scheduler = RefreshScheduler()
         context.rerender, context.dialog_closed = self._renew, self._closed
-        context.restart_idle = self._restart_idle
+        context.restart_idle = self._scheduler.restart_idle
         self.layers: tuple[BoxLayer | MovingLayer, ...] = ()
-        self.parts: dict[str, Panel] = {}
-        self._shown: dict[Panel, object] = {}
-        self._following: list[Panel] = []
-        self._often: dict[Panel, tuple[float, object]] = {}
-        self._waiting: deque[Panel] = deque()
-        self._noted_at = 0.0
-        self._changed_at: float | None = None  # since when parts wait for a pause
-        self._is_to_rest = False
-        self._late: set[Panel] = set()  # that wait for a rest, whatever they usually wait for
+        self.panels: dict[str, Panel] = {}
+        self._rendered: dict[Panel, object] = {}  # dependencies on the page; None where hidden
+        self._live: list[Panel] = []  # rendered while a slider is dragged
 
     def add(
         self,
         picture: LivePicture,
         layers: Sequence[BoxLayer | MovingLayer] = (),
-        parts: Sequence[Panel] = (),
+        panels: Sequence[Panel] = (),
     ) -> None:
-        """Add what has just been built, and write its pieces."""
         self.layers = (*self.layers, *layers)
-        self.parts |= {part.name: part for part in parts}
-        self._following = [
-            p for p in self.parts.values() if p.refresh in (Refresh.IMMEDIATE, Refresh.THROTTLED)
-        ]
-        self._write(parts, picture)
-        self._note(picture)
+        self.panels |= {panel.name: panel for panel in panels}
+        classes = (Refresh.IMMEDIATE, Refresh.THROTTLED)
+        self._live = [panel for panel in self.panels.values() if panel.refresh in classes]
+        self._write(panels, picture)
+        self._record(picture)
 
-    def show(self, picture: LivePicture, *, anew: bool = False) -> None:
-        """Show a picture; what is slow follows when changes pause."""
+    def show(self, picture: LivePicture, *, force: bool = False) -> None:
+        """Show a picture; slow panels follow when the changes pause."""
         for layer in self.layers:
             layer.show(picture)
-        if anew:
-            self._shown.clear()
-        # what is in sight changes with what is open on the page
-        known = self._context.picture
-        same = known is not None and known.state.page is picture.state.page and not anew
-        parts = self._following if same else self.parts.values()
-        self._write([one for one in parts if self._is_due(one, picture)], picture)
-        self._note(picture)
+        if force:
+            self._rendered.clear()
+        # panels come into sight where the look of the page changes
+        before = self._context.picture
+        same_page = before is not None and before.state.page is picture.state.page and not force
+        panels = self._live if same_page else self.panels.values()
+        self._write([panel for panel in panels if self._is_due(panel, picture)], picture)
+        self._record(picture)
 
-    def _is_due(self, part: Panel, picture: LivePicture) -> bool:
-        # a part that has just come into sight is not kept waiting, nor is one that has left it
-        if part.is_visible(picture.state) != (self._shown.get(part) is not None):
+    def _is_due(self, panel: Panel, picture: LivePicture) -> bool:
+        # panels appear and disappear at once
+        if panel.is_visible(picture.state) != (self._rendered.get(panel) is not None):
             return True
-        if part.refresh != Refresh.THROTTLED:
-            return part.refresh == Refresh.IMMEDIATE
-        now, urgent = time.monotonic(), part.dependencies(picture)[0]
-        at, before = self._often.get(part, (0.0, None))
-        is_due = now - at >= OFTEN_S or urgent != before
-        self._often[part] = (now, urgent) if is_due else (at, before)
-        return is_due
+        return self._scheduler.is_due(panel, picture)
 
-    def _note(self, picture: LivePicture) -> None:
+    def _record(self, picture: LivePicture) -> None:
         self._context.picture = picture
-        self._restart_idle()
-        self._changed_at = self._changed_at or self._noted_at
+        self._scheduler.record_picture()
 
-    def _restart_idle(self, *parts: Panel) -> None:
-        self._noted_at, self._is_to_rest = time.monotonic(), True
-        self._late.update(parts)
-
-    def _renew(self, part: Panel) -> None:
+    def _renew(self, panel: Panel) -> None:
         if self._context.picture is not None:
-            self._shown[part] = None  # whatever it depends on
-            self._write([part], self._context.picture)
+            self._rendered[panel] = None  # whatever it depends on
+            self._write([panel], self._context.picture)
 
     def _closed(self) -> None:
         self._context.page.forget("window")
-        windows = [part for part in self.parts.values() if isinstance(part, Dialog)]
-        self._shown |= dict.fromkeys(windows)
+        windows = [panel for panel in self.panels.values() if isinstance(panel, Dialog)]
+        self._rendered |= dict.fromkeys(windows)
 
-    def _write(self, parts: Iterable[Panel], picture: LivePicture) -> None:
+    def _write(self, panels: Iterable[Panel], picture: LivePicture) -> None:
         pieces: dict[str, str] = {}
-        for part in parts:
-            key = _key(part, picture)
-            if key != self._shown.get(part):
-                self._shown[part] = key
+        for panel in panels:
+            key = _key(panel, picture)
+            if key != self._rendered.get(panel):
+                self._rendered[panel] = key
                 if key is not None:
-                    pieces |= part.render(picture)
+                    pieces |= panel.render(picture)
         self._context.page.put(pieces)
 
     @property
     def due_in_s(self) -> float | None:
-        """How long until something is to follow; None where nothing has to."""
-        if self._waiting:
-            return 0.0
-        if self._changed_at is not None:
-            at = min(self._noted_at + PAUSE_S, self._changed_at + LONGEST_PAUSE_S)
-        elif self._is_to_rest:
-            at = self._noted_at + REST_S
-        else:
-            return None
-        return max(0.0, at - time.monotonic())
+        """Time until `settle` has to be called; None where nothing is to be rendered."""
+        return self._scheduler.due_in_s
 
     def settle(self, picture: LivePicture, guarded: Guarded) -> None:
-        """Bring the next part up to date; one at a time, so that a slider never waits for all."""
-        if not self._waiting:
-            follows = (
-                (Refresh.IDLE,)
-                if self._changed_at is None
-                else (Refresh.THROTTLED, Refresh.DEBOUNCED)
-            )
-            self._waiting.extend(p for p in self.parts.values() if p.refresh in follows)
-            if self._changed_at is None:
-                self._is_to_rest = False
-                self._waiting.extend(self._late)
-                self._shown |= dict.fromkeys(self._late)
-                self._late.clear()
+        """Render the next panel that is due; one at a time, so that a slider never waits long."""
+        queue = self._scheduler.queue
+        if not queue:
+            forced = self._scheduler.start_pass(self.panels.values())
+            if forced is not None:
+                self._rendered |= dict.fromkeys(forced)
                 for layer in self.layers:
                     if isinstance(layer, BoxLayer):
-                        guarded(layer, partial(layer.rest, picture))
-            self._changed_at = None
-        while self._waiting:
-            part = self._waiting.popleft()
-            if _key(part, picture) != self._shown.get(part):  # else it takes no turn
-                guarded(part, partial(self._write, [part], picture))
+                        guarded(layer, partial(layer.synchronise, picture))
+        while queue:
+            panel = queue.popleft()
+            if _key(panel, picture) != self._rendered.get(panel):
+                guarded(panel, partial(self._write, [panel], picture))
                 break
 
 
-def _key(part: Panel, picture: LivePicture) -> object:
-    return part.dependencies(picture) if part.is_visible(picture.state) else None
+def _key(panel: Panel, picture: LivePicture) -> object:
+    return panel.dependencies(picture) if panel.is_visible(picture.state) else None
 
 
 logger = logging.getLogger(__name__)
-TAB = "tab"  # events of the page itself begin with it
-TOKEN_WAIT_S = 0.25  # how long the first picture waits for a tab that may have been here before
-MOST_QUEUED, BEHIND_S = 4, 0.02  # messages that wait to be sent, and how long to wait for them
-ANSWER_S = 1.0  # how long a page may take to draw the map; one that does not say gets the rest
-
-
-_TURNS: deque[object] = deque()  # of tabs whose picture is made or waits to be made
+TAB = "tab"  # prefix of events of the page itself
+TOKEN_WAIT_S = 0.25  # the first picture waits for the token of a tab that reconnects
+MOST_QUEUED, BEHIND_S = 4, 0.02  # messages to a slow page, and the wait for it to read them
+ANSWER_S = 1.0  # after which a page that does not report its drawing is sent the surroundings
+_TURNS: deque[object] = deque()  # of tabs whose picture is being made, or waits
 _CHANGED = threading.Condition()
 
 
 @contextmanager
 def turn() -> Generator[None]:
-    """Make pictures of all tabs one after the other: made at once, all of them would be late."""
-    own = object()
+    """Wait until no other tab makes a picture; made at the same time, all would be late."""
+    ticket = object()
     with _CHANGED:
-        _TURNS.append(own)
-        _CHANGED.wait_for(lambda: _TURNS[0] is own)
+        _TURNS.append(ticket)
+        _CHANGED.wait_for(lambda: _TURNS[0] is ticket)
     try:
         yield
     finally:
         with _CHANGED:
             _TURNS.popleft()
             _CHANGED.notify_all()
-
-
-class Good(NamedTuple):
-    mark: Mark
-    page: PageLook  # of this tab
-
-
-def _bare(state: AppState) -> AppState:
-    """Return a state without what stands in the box and what it is compared with."""
-    return replace(state, part=PartLook(), look=Look(), comparison=Comparison(), controller=None,
-                   picked=None, lever="", forms={})  # fmt: skip
 
 
 class Session:
@@ -224,21 +175,21 @@ class Session:
         live: LiveModel,
         claim: "Callable[[Session, str], TabRecord | None]",
         *,
-        others: Tabs | None = None,  # the tabs of a shared review
+        review_tabs: Tabs | None = None,  # the tabs of a shared review
     ) -> None:
         self.context, self._live, self._claim = context, live, claim
         self._client = context.client
         self.token = new_token()
-        self._others = others
-        self._keeper = TabKeeper(context, shared=others is not None)
+        self._review_tabs = review_tabs
+        self._keeper = TabKeeper(context, shared=review_tabs is not None)
         self.display = Display(context)
-        # what was evaluated last without an exception: of the map, and of all that follows it
-        self._shown = self._settled = self._good()
-        self._failing = set[object]()  # parts that fail whatever is shown
-        self._is_known = False  # whether the page has said which tab it is
-        self._around_at: float | None = None  # when what lies around the map is drawn at the latest
+        # latest states that the map, and all panels, have been evaluated for
+        self._shown = self._settled = self._checkpoint()
+        self._failing = set[object]()  # panels and layers that fail in any state
+        self._is_identified = False  # whether the page has sent its token
+        self._surroundings_due_at: float | None = None  # at the latest
         self._stopped = threading.Event()
-        self._worker = threading.Thread(
+        self.worker = threading.Thread(
             target=self._run, name=f"warpspace-session-{self._client.client_id}", daemon=True
         )
 
@@ -248,11 +199,10 @@ class Session:
 
     @property
     def _tabs(self) -> Iterable[Context]:
-        """All that look at the state."""
-        return [self.context] if self._others is None else self._others()
+        return [self.context] if self._review_tabs is None else self._review_tabs()
 
     def start(self) -> None:
-        self._worker.start()
+        self.worker.start()
 
     def stop(self) -> None:
         self._stopped.set()
@@ -276,35 +226,39 @@ class Session:
     def _run(self) -> None:
         self.use(self.context.store)
         try:
-            self._guarded(self._build)
+            self.run_guarded(self._build)
             while not self._stopped.is_set():
                 self._turn()
         finally:
             self.context.store.unsubscribe(self.context.mark_changed)
-            if pointer := self.display.parts.get(PointerPanel.name):
+            if pointer := self.display.panels.get(PointerPanel.name):
                 pointer.handle(self.state, "gone", "")
 
     def _turn(self) -> None:
-        left = None if self._around_at is None else max(0.0, self._around_at - time.monotonic())
-        stage = self.context.stage
-        turns = None if stage is None else stage.wait_s
-        waits = [wait for wait in (self.display.due_in_s, left, turns) if wait is not None]
-        changed = self.context.wait(min(waits, default=None))
+        due_at, stage = self._surroundings_due_at, self.context.stage
+        waits = (
+            self.display.due_in_s,
+            None if due_at is None else max(0.0, due_at - time.monotonic()),
+            None if stage is None else stage.wait_s,
+        )
+        changed = self.context.wait(min((wait for wait in waits if wait is not None), default=None))
         while queued(self._client) > MOST_QUEUED and not self._stopped.wait(BEHIND_S):
-            pass  # pictures that a page does not take would fill the memory
+            pass  # unread pictures would fill the memory
         if changed and not self._stopped.is_set():
-            self._guarded(self._follow)
+            self.run_guarded(self._follow)
         picture = self.context.picture
         if picture is None:
             return
-        if self._around_at is not None and time.monotonic() >= self._around_at:
-            self._guarded(partial(self._draw_around, picture))
+        due_at = self._surroundings_due_at
+        if due_at is not None and time.monotonic() >= due_at:
+            self.run_guarded(partial(self.draw_surroundings, picture))
         if stage is not None and stage.wait_s == 0.0:
-            self._guarded(stage.turn)
+            self.run_guarded(stage.turn)
         if self.display.due_in_s == 0.0:
-            self._guarded(partial(self._settle, picture))
+            self.run_guarded(partial(self._settle, picture))
 
-    def _guarded(self, step: Callable[[], object]) -> None:
+    def run_guarded(self, step: Callable[[], object]) -> None:
+        """Run a step; log its exceptions and report them on the page."""
         try:
             step()
         except Exception as error:  # noqa: BLE001 - logged and shown
@@ -312,90 +266,91 @@ class Session:
 
     def _report(self, error: Exception, tabs: Iterable[Context], **title: str) -> None:
         if self._stopped.is_set() or not self.context.page.is_open:
-            return  # nobody is there to be told, and its widgets are gone
+            return  # a closed page has no widgets any more
         if not isinstance(error, WarpspaceError):
             logger.error("session %d", self._client.client_id, exc_info=error)
         for tab in tabs:
             tab.page.report(error, **title)
 
-    def _good(self) -> Good:
-        return Good(self.context.store.mark(), self.context.page_look)
+    # --- States that cannot be evaluated ----------------------------------------------------------
 
-    def _go_back(self, error: Exception, failed: Good, good: Good) -> bool:
-        """Replace a state that cannot be evaluated, with a message; tell whether that helps."""
+    def _checkpoint(self) -> Checkpoint:
+        return self.context.store.checkpoint(self.context.page_look)
+
+    def _revert(
+        self, error: Exception, failed: Checkpoint, target: Checkpoint,
+        title: str = "The change was reverted",
+    ) -> bool:  # fmt: skip
+        """Replace a state that cannot be evaluated; return False where that changes nothing."""
         context, tabs = self.context, self._tabs
         if context.story_state is not None:
-            tabs = [context]
-            self._guarded(
-                partial(self.display.parts[StoryPanel.name].handle, self.state, "end", "")
-            )
-        elif failed.mark.state is good.mark.state and failed.page is good.page:
+            tabs, story = [context], self.display.panels[StoryPanel.name]
+            self.run_guarded(partial(story.handle, self.state, "end", ""))
+        elif failed.state is target.state and failed.page is target.page:
             return False
-        elif failed.mark.state is not context.store.state:
-            return True  # another tab has replaced it
         else:
-            context.page_look = good.page
-            if not context.store.back_to(good.mark, failed.mark.state):
-                return True
-        self._report(error, tabs, title="The change was reverted")
+            if failed.state is context.store.state:
+                context.page_look = target.page
+            if not context.store.restore(target, failed.state):
+                return True  # another tab has replaced it
+        self._report(error, tabs, title=title)
         context.wake()
         return True
 
-    def _build(self) -> None:
-        """Show map and all that is written; the rest follows when the page has drawn that.
+    def _reduce(self, error: Exception) -> bool:
+        """Remove overlays and comparison from a scene that cannot be opened; False without any."""
+        state, now = self.context.store.state, self._checkpoint()
+        reduced = replace(state, part=PartLook(), look=Look(), comparison=Comparison(),
+                          controller=None, picked=None, lever="", forms={})  # fmt: skip
+        target = Checkpoint(state if reduced == state else reduced, (), (), now.page)
+        return self._revert(error, now, target, "Parts of the scene cannot be shown")
 
-        A page draws what it gets in one go before it answers anybody.
-        """
+    # --- The page opens: first the map and the panels, then the surroundings ----------------------
+
+    def _build(self) -> None:
         context = self.context
         if not context.events:
             context.wait(TOKEN_WAIT_S)
         if context.events and context.events[0].part == TAB:
-            self._hear(context.events.popleft())
-        context.wake()  # what else has come
+            self._handle_tab_event(context.events.popleft())
+        context.wake()  # for the other events
         try:
             self._open(self._live.evaluate(self.state))
         except Exception as error:
-            if not self._strip(error):
+            if not self._reduce(error):
                 raise
             self.display = Display(context)
             self._open(self._live.evaluate(self.state))
 
-    def _strip(self, error: Exception) -> bool:
-        """Leave out what may fail of a state that cannot be opened; tell whether it had any."""
-        now, bare = self.context.store.state, _bare(self.context.store.state)
-        if bare == now:
-            return False
-        self.context.store.back_to(Mark(bare, (), ()), now)
-        self._report(error, self._tabs, title="Not all of the scene can be shown")
-        return True
-
     def _open(self, picture: LivePicture) -> None:
         context = self.context
-        self._shown = self._settled = self._good()
-        with context.page.as_one():
-            self._darken(picture)
+        self._shown = self._settled = self._checkpoint()
+        with context.page.batch():
+            self._set_theme(picture)
             context.page.call("title", picture.state.scene.title)
             context.camera.place(picture)
             context.page.call("stage", "opening")
             layers = [BoxLayer(self._client.scene, context.page, picture)]
-            pointer = [PointerPanel(context, self._others)] if self._others else []
+            pointer = [PointerPanel(context, self._review_tabs)] if self._review_tabs else []
             self.display.add(picture, layers, [*build_panels(context), self._keeper, *pointer])
             context.page.call("drawn")
-        self._around_at = time.monotonic() + ANSWER_S
+        # a page draws a batch before it answers
+        self._surroundings_due_at = time.monotonic() + ANSWER_S
 
-    def _draw_around(self, picture: LivePicture) -> None:
-        self._around_at = None
+    def draw_surroundings(self, picture: LivePicture) -> None:
+        """Add what lies around the map, and answer clicks from now on."""
+        self._surroundings_due_at = None
         context = self.context
         try:
-            with context.page.as_one():
+            with context.page.batch():
                 context.stage = MovingLayer(self._client, context.page, picture)
                 context.stage.clamp = partial(context.send, "state:set.part.place")
                 self.display.add(picture, [context.stage])
                 context.page.call("stage", "open")
         except Exception as error:
-            if not self._strip(error):
+            if not self._reduce(error):
                 raise
-            self._around_at = time.monotonic()
+            self._surroundings_due_at = time.monotonic()
             return
 
         @self._client.scene.on_click()
@@ -407,80 +362,84 @@ class Session:
         if picture is None or context.story_state is not None:
             return
         ray = np.array([origin, direction], dtype=float)
-        if line := pick_line(picture, ray[0] / SCENE_PER_MM, ray[1]):
+        line = pick_line(picture, ray[0] / SCENE_PER_MM, ray[1])
+        if line:
             context.send("program:set.at_line", str(line))
             return
-        found = pick(picture, ray[0] / SCENE_PER_MM, ray[1])
-        if found is not None:
-            context.post(lambda state: with_clicked(state, found[0]))
+        hit = pick(picture, ray[0] / SCENE_PER_MM, ray[1])
+        if hit is not None:
+            context.post(lambda state: with_clicked(state, hit[0]))
 
-    def _hear(self, event: Event) -> None:
-        if event.word == "drawn" and self._around_at is not None:
-            self._around_at = 0.0
-        if event.word != "here" or self._is_known:
+    def _handle_tab_event(self, event: Event) -> None:
+        if event.word == "drawn" and self._surroundings_due_at is not None:
+            self._surroundings_due_at = 0.0
+        if event.word != "here" or self._is_identified:
             return
-        self._is_known = True
+        self._is_identified = True
         record = self._claim(self, event.value[:100])
         if record is not None:
             self.use(record.store)
             self.context.camera.wanted = record.camera
-        self._keeper.begin(known=record is not None)
+        self._keeper.begin(is_known=record is not None)
+
+    # --- The page follows changes -----------------------------------------------------------------
 
     def _follow(self) -> None:
         context = self.context
         for event in [context.events.popleft() for _ in range(len(context.events))]:
+            panel = self.display.panels.get(event.part)
             if event.part == TAB:
-                self._hear(event)
-            elif (part := self.display.parts.get(event.part)) is not None:
-                take = partial(part.handle, action=event.word, value=event.value)
-                self._guarded(partial(context.apply, take))
+                self._handle_tab_event(event)
+            elif panel is not None:
+                take = partial(panel.handle, action=event.word, value=event.value)
+                self.run_guarded(partial(context.apply, take))
         while context.actions:
-            self._guarded(context.actions.popleft())
+            self.run_guarded(context.actions.popleft())
         notes, context.notes = context.notes, []
-        now, state, shown = self._good(), self.state, context.picture
-        if shown is None:  # it could not be built
+        now, state, picture = self._checkpoint(), self.state, context.picture
+        if picture is None:  # the page could not be built
             return
-        if context.camera.wanted and focus(shown.state) == focus(state):
-            context.camera.place(shown)
-        if notes or state is not shown.state:
+        if context.camera.wanted and focus(picture.state) == focus(state):
+            context.camera.place(picture)
+        if notes or state is not picture.state:
             try:
                 with turn():
-                    self._show(self._live.evaluate(state), shown, anew=bool(notes))
+                    self._show(self._live.evaluate(state), picture, force=bool(notes))
             except Exception as error:
-                if not self._go_back(error, now, self._shown):
+                if not self._revert(error, now, self._shown):
                     raise
-                self._guarded(partial(self._show, shown, shown, anew=True))
+                self.run_guarded(partial(self._show, picture, picture, force=True))
                 return
             self._shown = now
         if notes:
             context.notify("Please note", "\n".join(notes), "warning")
 
-    def _show(self, picture: LivePicture, before: LivePicture, *, anew: bool) -> None:
+    def _show(self, picture: LivePicture, before: LivePicture, *, force: bool) -> None:
         context = self.context
-        with context.page.as_one():
-            self.display.show(picture, anew=anew)
+        with context.page.batch():
+            self.display.show(picture, force=force)
             if focus(before.state) != focus(picture.state):
                 context.page.call("title", picture.state.scene.title)
                 context.camera.place(picture)
             if before.state.shown.dark != picture.state.shown.dark:
-                self._darken(picture)
+                self._set_theme(picture)
 
-    def _darken(self, picture: LivePicture) -> None:
+    def _set_theme(self, picture: LivePicture) -> None:
         dark = picture.state.shown.dark
         self._client.gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False)
         self.context.page.call("dark", dark)
 
     def _settle(self, picture: LivePicture) -> None:
-        with turn(), self.context.page.as_one():
-            self.display.settle(picture, self._follow_picture)
+        with turn(), self.context.page.batch():
+            self.display.settle(picture, self._render)
         if self.display.due_in_s is None:
             self._settled = self._shown
 
-    def _follow_picture(self, part: object, step: Callable[[], object]) -> None:
+    def _render(self, part: object, step: Callable[[], object]) -> None:
         try:
             step()
             self._failing.discard(part)
         except Exception as error:  # noqa: BLE001 - logged and shown
-            if part in self._failing or not self._go_back(error, self._shown, self._settled):
+            if part in self._failing or not self._revert(error, self._shown, self._settled):
                 self._failing.add(part)
                 self._report(error, [self.context])

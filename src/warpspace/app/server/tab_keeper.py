@@ -1,10 +1,10 @@
-"""Which browser tab is which, and what is kept of one: in the server for a while, and in its page.
+"""Identity of browser tabs, and their recovery from the server or from a copy in the page.
 
-viser numbers connections, not tabs: after a dropped connection the page connects anew and counts as
-a new client. The page therefore keeps a random token in its `sessionStorage`, which belongs to one
-tab and survives a reload, and says it when it has connected. What a tab leaves behind is kept for
-a while under its token. A page whose browser forbids `sessionStorage`, and a tab that was closed
-and opened anew, start afresh. A restarted server knows no one: then helps what the page has kept.
+viser numbers connections, not tabs: a page that reconnects is a new client. The page therefore
+stores a random token in its `sessionStorage`, which belongs to one tab and survives a reload, and
+sends it after connecting. The record of a closed tab is stored for a while under its token. A page
+whose browser forbids `sessionStorage`, and a tab that was closed and opened again, start afresh.
+After a restart of the server, the tab is restored from the copy in its page.
 """
 
 import re
@@ -38,9 +38,9 @@ from warpspace.scene.model import Scene
 
 # --- In the server --------------------------------------------------------------------------------
 
-KEPT_SECONDS = 600.0
-KEPT_TABS = 64
-KEPT_BYTES = 256 * 2**20  # held by the histories of all of them
+RETENTION_S = 600.0
+MAX_CLOSED_TABS = 64
+MAX_HISTORY_BYTES = 256 * 2**20  # held by the histories of all of them
 _TOKEN = re.compile(r"[0-9a-f]{32}")
 
 
@@ -54,116 +54,118 @@ def is_token(text: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class TabRecord:
-    """What a tab leaves behind."""
+    """State and camera of a closed tab."""
 
     store: StateStore  # state and history
     camera: CameraMemory | None
 
 
 class TabMemory:
-    """Keeps what tabs leave behind, bounded in time, number and memory."""
+    """Records of closed tabs, limited in time, number and memory."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._left: OrderedDict[str, tuple[float, TabRecord]] = OrderedDict()
+        self._records: OrderedDict[str, tuple[float, TabRecord]] = OrderedDict()
 
-    def keep(self, token: str, left: TabRecord) -> None:
-        self._left.pop(token, None)
-        self._left[token] = (self._clock() + KEPT_SECONDS, left)
+    def __len__(self) -> int:
+        return len(self._records)
+
+    def keep(self, token: str, record: TabRecord) -> None:
+        self._records.pop(token, None)
+        self._records[token] = (self._clock() + RETENTION_S, record)
         self.forget()
 
     def forget(self) -> None:
-        """Forget what is too old, or too much; the oldest first."""
         now = self._clock()
-        size = sum(left.store.size_bytes for _, left in self._left.values())
-        while self._left:
-            until, oldest = next(iter(self._left.values()))
-            if until >= now and len(self._left) <= KEPT_TABS and size <= KEPT_BYTES:
+        size = sum(left.store.size_bytes for _, left in self._records.values())
+        while self._records:
+            until, oldest = next(iter(self._records.values()))
+            if until >= now and len(self._records) <= MAX_CLOSED_TABS and size <= MAX_HISTORY_BYTES:
                 break
             size -= oldest.store.size_bytes
-            self._left.popitem(last=False)
+            self._records.popitem(last=False)
 
     def take(self, token: str) -> TabRecord | None:
-        """Give back what a tab has left behind, once; None where there is nothing."""
+        """Return and delete the record of a tab; None where there is none."""
         self.forget()
-        return self._left.pop(token, (0.0, None))[1]
+        return self._records.pop(token, (0.0, None))[1]
 
 
 # --- In the page ----------------------------------------------------------------------------------
 
-NEVER_KEPT = (
-    "what Undo and Redo could go back to",
-    "other scenes that were opened in this tab",
-    "which error's curve was shown",
-    "a file that was being made",
+NEVER_RESTORED = (
+    "the history of Undo and Redo",
+    "other scenes opened in this tab",
+    "the selected error curve",
+    "a file in preparation",
 )
-COMPARISON = "the comparison, which was too large to keep"
-NO_TABLE = "the table of compensation that the box was drawn with, and its comparison"
-START_VALUES = "the values that Reset goes back to: it goes back to those restored"
+COMPARISON = "the comparison, which was too large"
+NO_TABLE = "the applied compensation table and its comparison"
+START_VALUES = "the values of Reset, which now returns to the restored ones"
 
 
-class Kept(msgspec.Struct, omit_defaults=True):
+class PageCopy(msgspec.Struct, omit_defaults=True):
     file: str = ""
     name: str = ""
-    link: str = ""  # where there is one: it knows what Reset goes back to
-    missing: tuple[str, ...] = ()  # what was left out, in words
+    link: str = ""  # where there is one: it holds the values of Reset
+    missing: tuple[str, ...] = ()  # omitted parts, as texts
 
 
-def kept_text(state: AppState, camera: CameraMemory | None, known: Sequence[Scene]) -> str:
-    """Spell a state for its page to keep."""
+def page_copy_text(state: AppState, camera: CameraMemory | None, scenes: Sequence[Scene]) -> str:
+    """Write the copy of a state that its page stores."""
     bare = without_table(state)
     missing = () if bare is state else (NO_TABLE,)
-    alone = replace(bare, comparison=Comparison())
-    for whole in (bare,) if alone == bare else (bare, alone):
+    single = replace(bare, comparison=Comparison())
+    for candidate in (bare,) if single == bare else (bare, single):
         with suppress(OptionError):
-            file, link = state_to_toml(whole, camera), named_link(whole, camera, known)
-            left_out = missing if whole is bare else (*missing, COMPARISON)
+            file, link = state_to_toml(candidate, camera), named_link(candidate, camera, scenes)
+            left_out = missing if candidate is bare else (*missing, COMPARISON)
             short = link if link and len(link) <= MAX_LINK else ""
-            kept = Kept(file, whole.scene.name, short, left_out)
-            text = msgspec.json.encode(kept).decode()
+            copy = PageCopy(file, candidate.scene.name, short, left_out)
+            text = msgspec.json.encode(copy).decode()
             if len(text) <= MAX_KEPT_TEXT:
                 return text
     return ""
 
 
-def read_kept(
-    text: str, known: Sequence[Scene]
+def read_page_copy(
+    text: str, scenes: Sequence[Scene]
 ) -> tuple[AppState, CameraMemory | None, tuple[str, ...]]:
-    """Build what a page has kept; with what has not come back, in words."""
+    """Build state and camera from the copy in a page; also list the parts that are missing."""
     try:
-        kept = msgspec.json.decode(text[: MAX_KEPT_TEXT + 1], type=Kept)
+        copy = msgspec.json.decode(text[: MAX_KEPT_TEXT + 1], type=PageCopy)
     except (ValueError, RecursionError):
-        raise OptionError("what this tab has kept cannot be read") from None
-    missing = (*NEVER_KEPT, *kept.missing)
+        raise OptionError("the copy in this tab is damaged") from None
+    missing = (*NEVER_RESTORED, *copy.missing)
     with suppress(WarpspaceError):
-        state, camera = open_link(kept.link, known)
-        if state_to_toml(state, camera) == kept.file:
+        state, camera = open_link(copy.link, scenes)
+        if state_to_toml(state, camera) == copy.file:
             return state, camera, missing
-    state, camera = open_text(kept.file, safe_name(kept.name, "kept"), "what this tab has kept")
+    state, camera = open_text(copy.file, safe_name(copy.name, "kept"), "the copy in this tab")
     return state, camera, (*missing, START_VALUES)
 
 
 RESTORED_TITLE = "This tab is restored"
 RESTORED = (
-    "Its server was restarted, or had forgotten it after ten minutes. What the tab had kept is"
-    " back: scene, errors, view, camera, the point asked about, and what is compared unless named"
-    " below. Undo goes to what the server was started with."
+    "The server was restarted, or the tab was disconnected for more than ten minutes. Scene,"
+    " errors, view, camera, picked point and comparison are restored unless named below. Undo"
+    " returns to the scene that the server was started with."
 )
 MISSING = "Not restored: {}."
 REFUSED_TITLE = "This tab could not be restored"
 REFUSED = (
-    "Its server was restarted, or had forgotten it after ten minutes. It begins anew, since what it"
-    " had kept cannot be used here: {}"
+    "The server was restarted, or the tab was disconnected for more than ten minutes. The tab"
+    " starts afresh, since its copy cannot be used here: {}"
 )
 JOINED_TITLE = "You are in the shared review as it is now"
 JOINED = (
-    "The server was restarted, and somebody has changed the review since. What this tab had kept"
-    " was not brought back."
+    "The server was restarted, and the review has been changed since. The copy in this tab was not"
+    " restored."
 )
 
 
 class TabKeeper(Panel):
-    """Has the page keep what it shows, and takes it back."""
+    """Stores a copy of the state in the page, and restores it after a restart of the server."""
 
     name = "keeper"
     refresh = Refresh.IDLE
@@ -171,7 +173,7 @@ class TabKeeper(Panel):
     def __init__(self, context: Context, *, shared: bool) -> None:
         super().__init__(context)
         self._shared = shared
-        self._may_keep, self._asked = False, False
+        self._may_keep, self._awaits_copy = False, False
 
         @context.client.camera.on_update
         async def _(_: object) -> None:
@@ -179,11 +181,11 @@ class TabKeeper(Panel):
 
         context.page.call("server.watch")
 
-    def begin(self, *, known: bool) -> None:
-        """Find out what the page has kept, once the server knows whether it knows the tab."""
-        self._may_keep, self._asked = True, not known
+    def begin(self, *, is_known: bool) -> None:
+        """Request the copy in the page unless the server knows the tab."""
+        self._may_keep, self._awaits_copy = True, not is_known
         self.context.restart_idle()
-        self.context.page.call("server.back", known)
+        self.context.page.call("server.back", is_known)
 
     def is_visible(self, state: AppState) -> bool:  # noqa: ARG002
         return self._may_keep and self.context.story_state is None
@@ -193,13 +195,13 @@ class TabKeeper(Panel):
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         context = self.context
-        text = kept_text(picture.state, context.camera.remember(), context.scenes.fixed)
+        text = page_copy_text(picture.state, context.camera.remember(), context.scenes.fixed)
         context.page.call("server.keep", text)
         return {}
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
-        if action == "kept" and self._asked:
-            self._asked = False
+        if action == "kept" and self._awaits_copy:
+            self._awaits_copy = False
             self.context.call_soon(partial(self._restore, value))
         return state
 
@@ -209,7 +211,7 @@ class TabKeeper(Panel):
             say(JOINED_TITLE, [JOINED])
             return
         try:
-            state, camera, missing = read_kept(text, context.scenes.fixed)
+            state, camera, missing = read_page_copy(text, context.scenes.fixed)
         except WarpspaceError as error:
             say(REFUSED_TITLE, [REFUSED.format(error)])
             return

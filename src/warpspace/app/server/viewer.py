@@ -1,4 +1,4 @@
-"""The server of the app: finds where it can serve, gives each tab a session, ends cleanly."""
+"""The server of the app: its address, the sessions of its tabs, its log and its end."""
 
 import asyncio
 import contextlib
@@ -31,7 +31,7 @@ from warpspace.app.panels.panel import Context
 from warpspace.app.server.connection_guard import Guard, TabConnection
 from warpspace.app.server.request_policy import Access, RequestPolicy, plain_address
 from warpspace.app.server.session import Session
-from warpspace.app.server.tab_keeper import KEPT_SECONDS, TabMemory, TabRecord, is_token, new_token
+from warpspace.app.server.tab_keeper import RETENTION_S, TabMemory, TabRecord, is_token, new_token
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
 from warpspace.exceptions import OptionError
@@ -46,13 +46,13 @@ LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 
 def resolve_host(host: str) -> str:
     try:
-        found = socket.getaddrinfo(host or " ", None, type=socket.SOCK_STREAM)
+        addresses = socket.getaddrinfo(host or " ", None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError, ValueError):
         raise OptionError(
             f"--host {host!r} cannot be resolved; expected an address of this machine,"
             " for instance 127.0.0.1 (this machine only) or 0.0.0.0 (all networks)"
         ) from None
-    return str(found[0][4][0])
+    return str(addresses[0][4][0])
 
 
 def is_local(address: str) -> bool:
@@ -64,21 +64,20 @@ def is_everywhere(address: str) -> bool:
 
 
 def served_names(host: str, address: str) -> frozenset[str]:
-    """List the names and addresses under which a page may ask for the app."""
     names = {host.lower(), plain_address(address)}
     if is_local(address):
         return frozenset(names | LOOPBACK_NAMES)
-    own = socket.gethostname()
+    hostname = socket.gethostname()
     if is_everywhere(address):
-        return frozenset(names | LOOPBACK_NAMES | {own.lower()})
+        return frozenset(names | LOOPBACK_NAMES | {hostname.lower()})
     with contextlib.suppress(OSError, UnicodeError):
-        if address in {str(found[4][0]) for found in socket.getaddrinfo(own, None)}:
-            names.add(own.lower())
+        if address in {str(found[4][0]) for found in socket.getaddrinfo(hostname, None)}:
+            names.add(hostname.lower())
     return frozenset(names)
 
 
 def has_other_users() -> bool:
-    """Tell whether others have an account on this machine, or are logged in to it."""
+    """Return whether others have an account on this machine, or are logged in to it."""
     if sys.platform == "win32":
         return False
     import pwd
@@ -95,7 +94,7 @@ def has_other_users() -> bool:
 
 
 def reachable_address(address: str) -> str:
-    """Give the address by which other machines most likely reach one that stands for all."""
+    """Return the address at which other machines most likely reach a wildcard address."""
     if not is_everywhere(address):
         return address
     family, far = (
@@ -159,7 +158,7 @@ def page_url(address: str, port: int) -> str:
 
 
 # --- A log that a client cannot fill --------------------------------------------------------------
-# Of lines of one kind the first is written, the rest counted.
+# Of lines of one kind the first is written, the others are counted.
 
 EVERY_S = 60.0
 MOST_KINDS = 256
@@ -168,10 +167,10 @@ OURS = "warpspace"
 
 
 class RepeatedLines(logging.Filter):
-    """Lets one line of a kind pass a minute; the next one says how many were left out.
+    """Filter that passes one line of a kind per minute and counts the others.
 
-    A kind is a logger, the first line of a message before its values are put in, and the type of
-    what was raised. Libraries' tracebacks become one line; those of the app are kept.
+    A kind is a logger, the first line of a message template, and the type of the exception.
+    Tracebacks of libraries are shortened to one line, those of the app are not.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -181,7 +180,7 @@ class RepeatedLines(logging.Filter):
         self._known: dict[tuple[str, str, str], tuple[float, int]] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Tell whether a line is written; shorten and complete it."""
+        """Return whether a line is written; shorten it and add the count of omitted lines."""
         raised = record.exc_info[0] if record.exc_info else None
         name = raised.__name__ if raised is not None else ""
         kind = (record.name, str(record.msg).partition("\n")[0], name)
@@ -211,11 +210,11 @@ def limit_log() -> None:
 
 
 NO_AUTHENTICATION = (
-    "WARNING: {host} can be reached from other machines, and with --no-token the app asks nobody"
-    " for a token or a password: whoever reaches it sees its scenes, and can use it"
+    "WARNING: {host} can be reached from other machines, and with --no-token the app requires no"
+    " token: anyone who reaches it can view and change its scenes"
 )
 OTHER_USERS = (
-    "Others who use this machine can open it too, without a token; --token TEXT asks for one"
+    "Other users of this machine can open the app without a token; --token TEXT requires one"
 )
 
 
@@ -233,10 +232,11 @@ class Viewer:
         access: Access | None = None,
     ) -> None:
         self.address = resolve_host(host)
-        self.token = (access := access or Access()).choose_token(local=self.is_local)
+        access = access or Access()
+        self.token = access.choose_token(local=self.is_local)
         self._services = replace(services or Services(), token=self.token)
         self.port = free_port(self.address, port)
-        doors = RequestPolicy(
+        policy = RequestPolicy(
             served_names(host, self.address),
             self.port,
             everywhere=is_everywhere(self.address),
@@ -249,14 +249,14 @@ class Viewer:
         self._live = LiveModel()
         self._sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
-        self._memory = TabMemory()
+        self.memory = TabMemory()
         self._shared = StateStore(self._start) if shared else None
-        self._server = _serve(self.address, self.port, Guard(doors))
-        light_scene(self._server.scene)
-        send_script_to_all(self._server, f"{page_script()}\nwarpspacePage.arrive();")
-        self._server.on_client_connect(self._connect)
-        self._server.on_client_disconnect(self._disconnect)
-        # the first tab need not wait for it
+        self.server = _serve(self.address, self.port, Guard(policy))
+        light_scene(self.server.scene)
+        send_script_to_all(self.server, f"{page_script()}\nwarpspacePage.arrive();")
+        self.server.on_client_connect(self._connect)
+        self.server.on_client_disconnect(self._disconnect)
+        # so that the first tab does not wait for it
         self._warming = threading.Thread(target=self._warm, name="warpspace-warm", daemon=True)
         self._warming.start()
 
@@ -266,12 +266,12 @@ class Viewer:
 
     @property
     def link(self) -> str:
-        """What to open in a browser of this machine: the address with the token."""
+        """Address with token, for a browser of this machine."""
         return self._with_token(self.url)
 
     @property
     def network_link(self) -> str:
-        """What to open in a browser of another machine."""
+        """Address with token, for a browser of another machine."""
         return self._with_token(page_url(reachable_address(self.address), self.port))
 
     def _with_token(self, url: str) -> str:
@@ -287,40 +287,40 @@ class Viewer:
             return tuple(self._sessions.values())
 
     def _warm(self) -> None:
-        with contextlib.suppress(Exception):  # the first tab says what fails
+        with contextlib.suppress(Exception):  # reported by the first tab
             surface(self._live.evaluate(self._start))
 
     async def _connect(self, client: viser.ClientHandle) -> None:
-        connection = connection_of(self._server, client)
+        connection = connection_of(self.server, client)
         if not isinstance(connection, TabConnection):
-            return  # it has gone meanwhile
+            return  # closed meanwhile
         store = self._shared.joined() if self._shared else StateStore(self._start)
         scenes = SceneList(self._scenes)
-        context = Context(self._server, client, store, scenes, self._services)
+        context = Context(self.server, client, store, scenes, self._services)
         context.notes += self._notes
-        others = (lambda: [one.context for one in self.sessions]) if self._shared else None
-        session = Session(context, self._live, self._claim, others=others)
+        tabs = (lambda: [tab.context for tab in self.sessions]) if self._shared else None
+        session = Session(context, self._live, self.claim, review_tabs=tabs)
         with self._lock:
             self._sessions[client.client_id] = session
         connection.listen(context.receive)
         session.start()
 
-    def _claim(self, session: Session, token: str) -> TabRecord | None:
+    def claim(self, session: Session, token: str) -> TabRecord | None:
         if not is_token(token):
             return None
         with self._lock:
             if session not in self._sessions.values():
-                return None  # its connection is gone already: it must not take what it left
+                return None  # already closed: it must not take its own record
             twins = [s for s in self._sessions.values() if s is not session and s.token == token]
-            left = self._memory.take(token)
+            record = self.memory.take(token)
             if not twins:
                 session.token = token
         if twins:
-            # a duplicated tab, or one whose old connection is not yet known to be dead
+            # a duplicated tab, or one whose previous connection is not closed yet
             twin = twins[0].context.store
-            left = TabRecord(twin.joined() if self._shared else twin.copy(), None)
+            record = TabRecord(twin.joined() if self._shared else twin.copy(), None)
             session.rename(new_token())
-        return left
+        return record
 
     async def _disconnect(self, client: viser.ClientHandle) -> None:
         with self._lock:
@@ -328,20 +328,20 @@ class Viewer:
             if session is None:
                 return
             try:
-                self._memory.keep(session.token, session.record())
+                self.memory.keep(session.token, session.record())
             finally:
                 session.stop()
-        asyncio.get_running_loop().call_later(KEPT_SECONDS + 1.0, self._forget)
+        asyncio.get_running_loop().call_later(RETENTION_S + 1.0, self._forget)
 
     def _forget(self) -> None:
         with self._lock:
-            self._memory.forget()
+            self.memory.forget()
 
     def stop(self) -> None:
         for session in self.sessions:
             session.stop()
         with contextlib.redirect_stdout(io.StringIO()):
-            self._server.stop()
+            self.server.stop()
 
     def __enter__(self) -> Self:
         return self
@@ -365,15 +365,15 @@ def _serve(address: str, port: int, guard: Guard) -> viser.ViserServer:
     problem = ""
     if not guarded:
         problem = (
-            f"viser {viser.__version__} starts its server in a way that cannot be guarded;"
-            " install the version that the constraints file names"
+            f"viser {viser.__version__} starts its server in an unknown way; install the version"
+            " given in the constraints file"
         )
     elif server.get_port() != port:
         problem = f"--port {port} has just been taken by another program; try again"
     if problem:
         server.stop()
         raise OptionError(problem)
-    # any tab could ask for a tunnel through a public relay
+    # any tab could open a tunnel through a public relay
     server.request_share_url = lambda *_args, **_kwargs: None
     return server
 
@@ -396,26 +396,26 @@ def run_viewer(
     browser: bool,
     say: Callable[[str], None],
     warn: Callable[[str], None],
-    **how: Any,
+    **options: Any,
 ) -> None:
-    """Serve the app until it is interrupted; `how` goes to `Viewer`."""
-    # a tab may close while something is on its way to it
+    """Serve the app until it is interrupted; `options` are those of `Viewer`."""
+    # a tab may close while a message is sent to it
     warnings.filterwarnings("ignore", message="Queued an? .* on a closed connection")
     limit_log()
-    with Viewer(scene, scenes, **how) as viewer:
+    with Viewer(scene, scenes, **options) as viewer:
         try:
-            say(f"{scene.title} is shown at {viewer.link} (Ctrl-C ends it)")
+            say(f"{scene.title} is shown at {viewer.link} (Ctrl-C stops the server)")
             if not viewer.is_local:
                 say(f"from other machines: {viewer.network_link}")
                 if code:
                     say(draw_code(viewer.network_link))
                 if viewer.token is None:
-                    warn(NO_AUTHENTICATION.format(host=how["host"]))
+                    warn(NO_AUTHENTICATION.format(host=options["host"]))
             elif viewer.token is None and has_other_users():
                 warn(OTHER_USERS)
             if browser and not open_browser(viewer.link):
-                say(f"no browser could be opened; open {viewer.link} yourself")
-            while True:  # a signal that the system gives to another thread is seen within a second
+                say(f"no browser found; open {viewer.link}")
+            while True:  # signals to other threads are handled within a second
                 time.sleep(1.0)
         except KeyboardInterrupt:
-            say("\nended")
+            say("\nstopped")

@@ -1,1 +1,1 @@
-"""What a tab shows, as frozen values; every change of it is a pure function."""
+"""The state of a tab as frozen values; every change of it is a pure function."""

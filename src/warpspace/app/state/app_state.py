@@ -1,8 +1,7 @@
-"""What a session shows, as one frozen value. Every change of it is a pure function.
+"""The state of a session as one frozen value. Every change of it is a pure function.
 
-Whatever comes from a browser passes through `warpspace.app.state.tree.put`: it brings numbers into
-their range, keeps the old value in place of what is none, and notes in `AppState.notes` what it
-changed.
+Values from a browser pass through `warpspace.app.state.tree.put`: it clamps numbers to their range,
+rejects invalid values and records both in `AppState.notes`.
 """
 
 from collections.abc import Collection, Mapping
@@ -11,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpspace.app.state.leaf import Span, described, error_names, said
+from warpspace.app.state.leaf import Span, describe, described, error_names
 from warpspace.app.state.look import (
     Look,
     MachineLook,
@@ -55,23 +54,23 @@ COMPONENT_NAMES = {
     },
     "uncertainty": {"norm": "U95 |E|", "x": "U95 E_x", "y": "U95 E_y", "z": "U95 E_z"},
 }
-"""What the components are called, for each quantity that can be coloured."""
+"""Labels of the components, for each quantity of the colours."""
 LOOP_NAMES = {
     Loop.TOOL.value: "tool point",
     Loop.WORKPIECE.value: "workpiece point",
     Loop.RELATIVE.value: "tool relative to workpiece",
 }
-KEPT = ("component", "nodes", "shown", "look", "machine", "part", "forms", "page")
-"""What stays when another scene is shown."""
-SHOWN = {"a": "A", "b": "B", "difference": "B − A"}
-"""What can be drawn of a comparison; the difference is the change from A to B."""
+KEPT_FIELDS = ("component", "nodes", "shown", "look", "machine", "part", "forms", "page")
+"""Fields that stay when another scene is opened."""
+COMPARISON_VIEWS = {"a": "A", "b": "B", "difference": "B − A"}
+"""Views of a comparison; the difference is the change from A to B."""
 PRESENT, NOBODY = "present errors", "nothing"
-"""Names of what is steered, and of no other side."""
+"""Labels of the present state, and of no second side."""
 _load_workpiece = lru_cache(maxsize=4)(load_workpiece)
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class DisplayOptions:
     traces: bool = described(
         True, "Rotary traces", hint="Circles and arcs of the table: nominal light, actual dark."
     )
@@ -85,20 +84,20 @@ class Shown:
 
 @dataclass(frozen=True, slots=True)
 class Exclusions:
-    """Parameters that do not take part, and those that alone do."""
+    """Parameters that are excluded, and those that exclude all others."""
 
     excluded: frozenset[str] = described(
         frozenset[str](),
         "Excluded errors",
-        one="Exclusion of {}",
+        item_label="Exclusion of {}",
         choices=error_names,
         linked="excluded",
     )
-    # where there are any, all others are left out, and so are excluded ones among them
+    # where there are any, all others are excluded, too
     only: frozenset[str] = described(
         frozenset[str](),
         "Errors drawn alone",
-        one="Only {}",
+        item_label="Only {}",
         choices=error_names,
         linked="only",
     )
@@ -107,7 +106,7 @@ class Exclusions:
         return bool(self.excluded or self.only)
 
     def active(self, key: str) -> bool:
-        """Tell whether a parameter takes part."""
+        """Return whether a parameter is not excluded."""
         return key not in self.excluded and (not self.only or key in self.only)
 
     def within(self, keys: Collection[str]) -> "Exclusions":
@@ -116,28 +115,31 @@ class Exclusions:
 
 @dataclass(frozen=True, slots=True)
 class Specification:
-    """What a design is held against: a limit, where it holds, how tolerances are filled, traded."""
+    """Requirements of a design: limit, place of evaluation, tolerances and their costs."""
 
     limit_um: float = described(START_UM, "|E| allowed", span=LIMIT_UM, unit="µm")
-    # one random point of each machine (as in the thesis), or its worst point, which is the rule
+    # at one random point of each machine (as in the thesis), or at its worst point (the default)
     over: str = described(
         "max",
         "Evaluated at",
         choices={"max": "everywhere", "sampled": "a random point"},
-        hint="Where each sampled machine has to stay within the limit: everywhere in the volume, or"
+        hint="Where each sampled machine must stay within the limit: everywhere in the volume, or"
         " at one random point (as in the thesis).",
     )
     distribution: str = described(
         "uniform",
         "Errors in their tolerance",
         choices={"uniform": "uniform", "normal": "normal, 3σ at the limits"},
-        hint="How the errors of the machines are spread over their tolerances.",
+        hint="Distribution of the errors of the machines within their tolerances.",
     )
-    # share of the machines that is to stay within the limit once tolerances are allocated
+    # required share of machines within the limit, for the allocation of tolerances
     percent: float = described(95.0, "Probability wanted", span=PERCENT, unit="%")
-    # tolerances that are neither allocated nor scaled
+    # tolerances that allocation and scaling leave unchanged
     fixed: frozenset[str] = described(
-        frozenset[str](), "Fixed tolerances", one="Fixed tolerance of {}", choices=error_names
+        frozenset[str](),
+        "Fixed tolerances",
+        item_label="Fixed tolerance of {}",
+        choices=error_names,
     )
     costs: str = described(
         "",
@@ -148,10 +150,10 @@ class Specification:
 
 @dataclass(frozen=True, slots=True)
 class Picked:
-    """A point somebody asks about; it stays where the axes stand while errors change."""
+    """A picked point; its axis positions stay while errors change."""
 
-    # mm or degrees; axis positions: those of the linear axes for a point of the surface (the rotary
-    # ones stand where the state has them), those of all axes for a point of a trace
+    # mm or degrees; positions of the linear axes for a point of the surface (those of the rotary
+    # axes are in the state), of all axes for a point of a trace
     at: Mapping[str, float]
     # loop of a trace; None for a point of the surface, which follows the loop of the view
     loop: Loop | None = None
@@ -160,7 +162,7 @@ class Picked:
 
     @classmethod
     def of_note(cls, note: Note) -> "Picked | None":
-        """Give the point that a note is pinned to; none for the whole or a body."""
+        """Return the point of a note; None for a note on the scene or on a body."""
         mark = note.on or NoteAnchor()
         if not note.at or mark.body:
             return None
@@ -170,10 +172,10 @@ class Picked:
 
 @dataclass(frozen=True, slots=True)
 class PartLook:
-    """The part that stands in the box, in place of the scene's own."""
+    """The workpiece in the box, in place of the scene's own."""
 
-    # mesh and text of the program are never saved or linked
-    mesh: Workpiece | None = field(default=None, metadata=said("Mesh of the part"))
+    # mesh and text of the program are never stored in files or links
+    mesh: Workpiece | None = field(default=None, metadata=describe("Mesh of the part"))
     name: str = described("", "Part", linked="part")
     place: tuple[float, ...] | None = described(
         None,
@@ -181,13 +183,15 @@ class PartLook:
         kind="point",
         span=PLACE,
         linked="place",
-        hint="Where the part is clamped, in the workpiece frame: x, y, z in mm, and turns in"
-        " degrees about the fixed x, y and z, in that order; empty for the usual place.",
+        hint="Fixture position of the part in the workpiece frame: x, y, z in mm, and rotations in"
+        " degrees about the fixed x, y and z, in that order; empty for the default.",
     )
-    program: str | None = field(default=None, metadata=said("Program"))
-    program_name: str = field(default="", metadata=said("Program"))
+    program: str | None = field(default=None, metadata=describe("Program"))
+    program_name: str = field(default="", metadata=describe("Program"))
     shown: bool = described(
-        True, "Part in the box", hint="As this machine cuts it, and lines of the nominal part."
+        True,
+        "Part in the box",
+        hint="The part as cut by this machine, with edges of the nominal part.",
     )
     normal: bool = described(
         False, "Coloured along its normal", hint="Material too much above zero, too little below."
@@ -198,23 +202,22 @@ class PartLook:
 
     @classmethod
     def of_scene(cls, scene: Scene) -> tuple["PartLook", tuple[str, ...]]:
-        """Return what a scene names, and why some files cannot be read: only their names."""
-        own, mesh, text, notes = scene.part, None, None, list[str]()
+        """Read the files of a scene's part; return errors for files that cannot be read."""
+        part, mesh, text, notes = scene.part, None, None, list[str]()
         try:
-            if path := own.path("program"):
+            if path := part.path("program"):
                 text = "".join(program_lines(path))
-            if path := own.path("file"):
-                mesh = _load_workpiece(path, own.unit or None)
+            if path := part.path("file"):
+                mesh = _load_workpiece(path, part.unit or None)
         except WarpspaceError as error:
             notes.append(str(error))
-        except Exception as error:  # noqa: BLE001 - whatever a file holds, the scene opens
+        except Exception as error:  # noqa: BLE001 - a damaged file must not prevent opening
             notes.append(f"part of the scene: {error!r}")
-        look = cls(mesh, Path(own.file).name, own.place, text, Path(own.program).name)
+        look = cls(mesh, Path(part.file).name, part.place, text, Path(part.program).name)
         return look, tuple(notes)
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing of it stands in the box."""
         return (self.mesh is None or not self.shown) and self.program is None
 
 
@@ -226,17 +229,17 @@ class PageLook:
         "Open sections",
         linked="",
     )
-    # error whose row is unfolded: chosen, or the one moved last; empty for none yet
+    # error with the unfolded row: selected, or changed last; empty for none
     row: str = described(
         "", "Unfolded error", choices=lambda state: {"": "none", **error_names(state)}, linked=""
     )
     query: str = described("", "Search of errors", linked="")
     command: str = described("", "Search of commands", linked="")
     window: str = described("", "Open window", linked="")
-    # "list", "new", or the note that is edited; empty where the tasks stand there
+    # "list", "new", or the edited note; empty where the tasks are shown
     notes: str = described("", "Notes", linked="")
     figure: str = described("", "Figure", linked="")
-    # what has been typed of a note that is not kept yet
+    # draft of a note
     note_kind: str = described("note", "Kind", choices={k: k for k in KINDS}, linked="")
     note_place: str = described("point", "About", choices=lambda state: {
         "point": "clicked or worst point", "whole": "the whole",
@@ -249,55 +252,55 @@ class PageLook:
 
 @dataclass(frozen=True)
 class Side:
-    title: str = PRESENT  # what it is called on the page
-    state: "AppState | None" = None  # what it is; None for what is steered
-    # whether it is a scene as opened, which is looked at as what is steered (rotary positions,
-    # loop), rather than what was pinned, which keeps its own
+    title: str = PRESENT  # label on the page
+    state: "AppState | None" = None  # None for the present state
+    # a scene as opened, shown with rotary positions and loop of the present state; a pinned state
+    # has its own
     is_scene: bool = False
 
 
 @dataclass(frozen=True)
 class Comparison:
     a: Side = field(default_factory=Side)
-    b: Side | None = None  # none while nothing is compared
-    shown: str = described("a", "Side that is drawn", choices=SHOWN, linked="compare.shown")
-    # whether the other side is drawn too, as a wireframe
+    b: Side | None = None  # None without a comparison
+    shown: str = described(
+        "a", "Side that is drawn", choices=COMPARISON_VIEWS, linked="compare.shown"
+    )
     ghost: bool = described(True, "Other side as a wireframe", linked="compare.ghost")
-    pinned: Side | None = None  # what was pinned last: the state before, or a proposal
+    pinned: Side | None = None  # pinned last: the state before, or a proposal
 
     def off(self) -> "Comparison":
-        """End it; what was pinned stays."""
         return Comparison(pinned=self.pinned, ghost=self.ghost)
 
 
 @dataclass(frozen=True, slots=True)
 class AppState:
-    """All that a picture depends on."""
+    """Everything that a picture depends on."""
 
-    # machine, curves of the errors, working volume; its amplitudes are where reset goes
-    scene: Scene = field(metadata=said("Scene"))
+    # machine, curves of the errors, working volume
+    scene: Scene = field(metadata=describe("Scene"))
     # µm or µrad; amplitude of every parameter of the scene
     amplitudes: Mapping[str, float] = field(
-        metadata=said(
+        metadata=describe(
             "Errors",
             kind="number",
             each=lambda state: dict.fromkeys(state.amplitudes, AMPLITUDE),
             linked="{key}",
         )
     )
-    # degrees; where the rotary axes stand
+    # degrees; of the rotary axes
     positions: Mapping[str, float] = field(
-        metadata=said(
+        metadata=describe(
             "Rotary positions",
             kind="number",
-            one="Position of {}",
+            item_label="Position of {}",
             each=lambda state: state.position_spans,
             linked="{key}",
             hint="Position while the working volume is evaluated.",
         )
     )
-    start: Mapping[str, float]  # µm or µrad; amplitudes that reset goes back to: the scene's
-    # how much larger than true the errors are drawn; None chooses a round number
+    start: Mapping[str, float]  # µm or µrad; amplitudes after a reset: those of the scene
+    # display factor of displacements; None selects a round number
     exaggeration: float | None = described(
         None, "Exaggeration", choices={"auto": "auto"}, kind="number", span=EXAGGERATION
     )
@@ -308,13 +311,13 @@ class AppState:
         Loop.TOOL,
         "Structural loop",
         choices=LOOP_NAMES,
-        hint="Whose error deforms the box: tool, workpiece, or one against the other.",
+        hint="The error that deforms the box: of the tool, of the workpiece, or relative.",
     )
     placed: bool = described(
         False,
-        "Placement of the workpiece fitted out",
-        hint="Remove the position of the workpiece, which does not show on a part: three shifts"
-        " and three small rotations, fitted over the working volume.",
+        "Best-fit placement removed",
+        hint="Remove the placement of the workpiece, which has no effect on a part: three"
+        " translations and three small rotations, fitted over the working volume.",
     )
     nodes: int = described(
         START_NODES,
@@ -323,44 +326,41 @@ class AppState:
         unit="nodes",
         hint="Nodes along X, Y and Z at which the error is computed.",
     )
-    shown: Shown = field(default_factory=Shown)
-    # parameters that do not take part, or alone do
+    shown: DisplayOptions = field(default_factory=DisplayOptions)
     exclusions: Exclusions = field(default_factory=Exclusions)
-    # what machines are sampled from: the scene's, as far as they have not been moved
+    # of sampled machines: the scene's, unless changed
     tolerances: ToleranceSet = field(
         default_factory=ToleranceSet,
-        metadata=said(
+        metadata=describe(
             "Tolerances",
             kind="number",
-            one="Tolerance of {}",
+            item_label="Tolerance of {}",
             each=lambda state: dict.fromkeys(state.amplitudes),
             linked="",
         ),
     )
-    # what the tolerances are held against
     specification: Specification = field(default_factory=Specification)
-    # the scene as it was opened, where curves of `scene` have been edited since
-    loaded: Scene | None = field(default=None, metadata=said("Scene"))
-    # title of the scene whose errors a machine chosen from the library left behind; empty for none,
-    # and after the next change of scene
-    left_behind: str = field(default="", metadata=said("Scene"))
-    # what is shown of the field and of the schematic machine, and traced
+    # the scene as opened, where `scene` has been edited since
+    loaded: Scene | None = field(default=None, metadata=describe("Scene"))
+    # title of the scene whose errors were dropped with its machine; empty for none, and after the
+    # next change of scene
+    left_behind: str = field(default="", metadata=describe("Scene"))
     look: Look = field(default_factory=Look)
     machine: MachineLook = field(default_factory=MachineLook)
     rotary: RotaryLook = field(default_factory=RotaryLook)
     part: PartLook = field(default_factory=PartLook)
-    # the point whose error is explained, and the error whose axis and lever are drawn
-    picked: Picked | None = field(default=None, metadata=said("Point"))
+    # the picked point, and the error with axis and lever drawn
+    picked: Picked | None = field(default=None, metadata=describe("Point"))
     lever: str = described("", "Lever", choices=lambda state: {"": "none", **error_names(state)})
-    comparison: Comparison = field(default_factory=Comparison, metadata=said("Comparison"))
-    # whose table corrects the machine that is drawn; never saved or linked
-    controller: "Controller | None" = field(default=None, metadata=said("Table of compensation"))
-    # notes of reviewers; beside the scene, which is a key of what has been computed of it
-    review: tuple[Note, ...] = field(default=(), metadata=said("Notes"))
-    # what of the page is open, and what its forms were told (`state/forms.py`); undo leaves both
+    comparison: Comparison = field(default_factory=Comparison, metadata=describe("Comparison"))
+    # with the applied compensation table; never stored in files or links
+    controller: "Controller | None" = field(default=None, metadata=describe("Compensation table"))
+    # notes of reviewers; not in the scene, which is a key of caches
+    review: tuple[Note, ...] = field(default=(), metadata=describe("Notes"))
+    # open sections of the page, and texts of its forms (`form_values.py`); undo changes neither
     page: PageLook = field(default_factory=PageLook, compare=False)
     forms: Mapping[str, str] = field(default_factory=dict[str, str], compare=False)
-    notes: tuple[str, ...] = ()  # what the latest change had to clamp
+    notes: tuple[str, ...] = ()  # values that the latest change clamped or rejected
 
     @property
     def position_spans(self) -> Mapping[str, Span]:
@@ -368,25 +368,26 @@ class AppState:
 
     @property
     def origin(self) -> Scene:
-        """The scene as it was opened: where reset goes, and what it is known by."""
+        """The scene as opened, which reset returns to."""
         return self.loaded or self.scene
 
     @property
     def own_curves(self) -> Mapping[str, ErrorFunction]:
-        """The curves of the scene as it was opened, over the present working volume."""
-        own, present = self.origin, self.scene
-        if own.workspace == present.workspace and own.machine.axes == present.machine.axes:
-            return own.errors.functions
-        found: dict[str, ErrorFunction] = {}
-        for key, function in own.errors.functions.items():
+        """The curves of the scene as opened, over the present working volume."""
+        original, present = self.origin, self.scene
+        same_axes = original.machine.axes == present.machine.axes
+        if same_axes and original.workspace == present.workspace:
+            return original.errors.functions
+        curves: dict[str, ErrorFunction] = {}
+        for key, function in original.errors.functions.items():
             if parameter(key).axis in present.machine.axes:
                 span = present.axis_span(parameter(key).axis)
-                found[key] = replace(function.for_span(span), span=span)
-        return found
+                curves[key] = replace(function.for_span(span), span=span)
+        return curves
 
     @property
     def active(self) -> Mapping[str, float]:
-        """Amplitudes that count, µm or µrad: those that are excluded are zero."""
+        """Amplitudes, µm or µrad; those of excluded errors are zero."""
         if not self.exclusions:
             return self.amplitudes
         takes_part = self.exclusions.active
@@ -397,8 +398,8 @@ class AppState:
         return tuple(key for key, value in self.amplitudes.items() if value != self.start[key])
 
     @property
-    def seen(self) -> tuple[Loop, bool]:
-        """The loop, and whether the placement of the workpiece is left out: a key to keep by."""
+    def view_key(self) -> tuple[Loop, bool]:
+        """The loop, and whether the best-fit placement is removed: a key of caches."""
         return self.loop, self.placed and self.loop is Loop.RELATIVE
 
     def axis_span(self, key: str) -> tuple[float, float]:
@@ -409,11 +410,10 @@ class AppState:
         return function.with_amplitude(self.amplitudes[key])
 
     def resulting_scene(self) -> Scene:
-        """Give the scene that the state amounts to: what is saved, drawn and exported."""
         scene, limit = self.scene, self.specification.limit_um
         keys = [k for k, at in self.amplitudes.items() if at or k in scene.errors.functions]
-        known = scene.workspace.positions
-        moved = {axis: at for axis, at in self.positions.items() if at != known.get(axis)}
+        scene_positions = scene.workspace.positions
+        moved = {axis: at for axis, at in self.positions.items() if at != scene_positions.get(axis)}
         return replace(
             scene,
             errors=ErrorSet({key: self.curve(key) for key in keys}),
@@ -426,49 +426,48 @@ class AppState:
         )
 
     def active_scene(self) -> Scene:
-        """Give the scene as it is drawn: what is excluded is left out."""
+        """Build the scene as drawn, without excluded errors."""
         return replace(self, amplitudes=self.active).resulting_scene()
 
     @property
     def standing(self) -> Scene:
-        """The scene with its rotary axes where they stand, the workpiece placed or not."""
+        """The scene with the rotary positions and the placement of the state."""
         workspace = self.scene.workspace.moved(self.positions)
         return replace(self.scene, placed=self.placed, workspace=workspace)
 
     def view(self, loop: Loop | None = None) -> View:
-        """Give the view through a loop, the present one by default, at the present positions."""
+        """Return the view of a loop, by default the present one, at the present positions."""
         return self.standing.view(loop or self.loop)
 
     def noted(self, *notes: str) -> "AppState":
-        """Say what could not be taken as it was given; an empty note is none."""
-        found = tuple(filter(None, notes))
-        return replace(self, notes=(*self.notes, *found)) if found else self
+        """Add notes on clamped or rejected values; empty ones are dropped."""
+        texts = tuple(filter(None, notes))
+        return replace(self, notes=(*self.notes, *texts)) if texts else self
 
     def without_notes(self) -> "AppState":
         return replace(self, notes=()) if self.notes else self
 
     def with_amplitude(self, key: str, value: float) -> "AppState":
-        """Give one parameter an amplitude that the program has worked out, µm or µrad."""
         return replace(self, amplitudes={**self.amplitudes, key: value})
 
     def with_scene(self, scene: Scene) -> "AppState":
-        """Show another scene, in its own loop; component, density and switches stay."""
-        fresh, kept = start_state(scene), {name: getattr(self, name) for name in KEPT}
+        """Open another scene in its own loop; component, density and switches stay."""
+        fresh, unchanged = start_state(scene), {name: getattr(self, name) for name in KEPT_FIELDS}
         if not fresh.part.is_empty:
-            kept["part"], kept["look"] = fresh.part, replace(self.look, surface="grid")
-            kept["forms"] = {**self.forms, **fresh.forms}
-        shown = replace(
+            unchanged["part"], unchanged["look"] = fresh.part, replace(self.look, surface="grid")
+            unchanged["forms"] = {**self.forms, **fresh.forms}
+        changed = replace(
             fresh,
             specification=self.specification if scene.limit_um is None else fresh.specification,
             rotary=replace(self.rotary, off=frozenset()),
-            **kept,
+            **unchanged,
         )
-        return shown.within_reach()
+        return changed.within_reach()
 
     def within_reach(self) -> "AppState":
-        """Bring slices, axes and held angles into the scene's ranges; those without axis go."""
+        """Clamp slices, axes and held angles to the scene's ranges; drop those without an axis."""
         spans, slices = linear_spans(self.scene), slice_spans(self.scene)
-        held = {
+        held_at = {
             axis: tuple(at for at in self.rotary.held.get(axis, ()) if span.low <= at <= span.high)
             for axis, span in self.position_spans.items()
         }
@@ -476,21 +475,20 @@ class AppState:
             self,
             look=replace(self.look, slices_mm=clamped(slices, self.look.slices_mm)),
             machine=replace(self.machine, linear_mm=clamped(spans, self.machine.linear_mm)),
-            rotary=replace(self.rotary, held={axis: at for axis, at in held.items() if at}),
+            rotary=replace(self.rotary, held={axis: at for axis, at in held_at.items() if at}),
         )
 
     def with_edited(self, scene: Scene) -> "AppState":
-        """Show the scene with something edited; the same object where it is the same scene."""
-        same = next((one for one in (self.origin, self.scene) if one == scene), scene)
+        """Replace the scene by an edited one; equal scenes keep their identity."""
+        same = next((known for known in (self.origin, self.scene) if known == scene), scene)
         return replace(self, scene=same, loaded=None if same is self.origin else self.origin)
 
     def reset(self) -> "AppState":
-        """Give all errors the scene's values and curves again."""
         changed = replace(self.scene, errors=ErrorSet(self.own_curves))
         return replace(self.with_edited(changed), amplitudes=self.start)
 
     def at_rest(self) -> "AppState":
-        """Give what the view of a note is spelled from: nothing that is saved with the scene."""
+        """Return the reference for the view of a note: without settings stored in the scene."""
         at_zero = dict.fromkeys(self.positions, 0.0)
         limit = replace(self.specification, limit_um=START_UM)
         return replace(self.zeroed(), positions=at_zero, exaggeration=None, loop=Loop.TOOL,
@@ -525,10 +523,6 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
 
 
 def start_loop(scene: Scene) -> Loop:
-    """Choose the loop a scene is first shown through.
-
-    The tool loop; the relative one where only axes that carry the workpiece have errors, since the
-    tool point then has none.
-    """
+    """Return the initial loop: relative where only axes of the workpiece have errors, else tool."""
     axes = {parameter(key).axis for key in scene.parameter_keys if scene.errors.amplitude(key)}
     return Loop.RELATIVE if axes and axes.isdisjoint(scene.machine.chain.tool) else Loop.TOOL

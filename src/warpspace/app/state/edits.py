@@ -1,4 +1,4 @@
-"""Ranges of sliders, and changes of a state: its curves, its tolerances, what of it is seen."""
+"""Ranges of sliders, and edits of curves, tolerances and surface of a state."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -14,11 +14,11 @@ from warpspace.machine.limits import MAX_ERROR, MAX_HALF_WIDTH, MIN_HALF_WIDTH
 LEAST_TRANSLATION_UM = 20.0
 LEAST_ROTATION_URAD = 50.0
 LEAST_HALF_WIDTH = 10.0
-FINE_STEP, FINE = 0.1, (5.0, 500.0)  # a slider that ends between has this step
+FINE_STEP, FINE = 0.1, (5.0, 500.0)  # step of sliders with an end in this range
 
 
 def _span(low: float, reach: float) -> Span:
-    """Choose a slider that reaches a value, with a round end: 1, 2 or 5 × 10ⁿ."""
+    """Return the range of a slider up to a value, with a round end: 1, 2 or 5 × 10ⁿ."""
     high = min(round_width(reach * (1.0 - 1e-9)), MAX_ERROR)
     fine = FINE[0] <= high <= FINE[1]
     return Span(low * high, high, FINE_STEP if fine else 10.0 ** (math.ceil(math.log10(high)) - 3))
@@ -34,7 +34,7 @@ def amplitude_span(key: str, value: float, tolerance: Tolerance | None) -> Span:
 
 def with_curve(state: AppState, key: str, function: ErrorFunction) -> AppState:
     if key not in state.amplitudes:
-        return state.noted(f"{key}: no parameter of this machine")
+        return state.noted(f"{key} is not a parameter of this machine")
     if parameter(key).is_constant and not isinstance(function, Constant):
         return state.noted(f"{key} is constant along its axis; expected one number")
     if function == state.curve(key):
@@ -45,45 +45,47 @@ def with_curve(state: AppState, key: str, function: ErrorFunction) -> AppState:
 
 
 def half_width_of(state: AppState, key: str) -> float:
-    """Give the half width of a parameter's tolerance, µm or µrad; 0 where it has none."""
-    found = state.tolerances.get(key)
-    return 0.0 if found is None else found.half_width
+    """Return the half-width of a parameter's tolerance, µm or µrad; 0 where it has none."""
+    tolerance = state.tolerances.get(key)
+    return 0.0 if tolerance is None else tolerance.half_width
 
 
 def half_width_span(state: AppState, key: str) -> Span:
-    """Choose the range of a tolerance slider: up to about twice the scene's half width, or more.
+    """Return the range of a tolerance slider: about twice the scene's half-width.
 
-    It holds the present half width, which an allocation may have made wider.
+    It includes the present half-width, which an allocation may have widened.
     """
-    found = state.origin.tolerances.get(key)
-    widest = max(2.0 * (found.half_width if found else 0.0), LEAST_HALF_WIDTH)
+    tolerance = state.origin.tolerances.get(key)
+    widest = max(2.0 * (tolerance.half_width if tolerance else 0.0), LEAST_HALF_WIDTH)
     return _span(0.0, max(widest, half_width_of(state, key)))
 
 
 def with_scene_tolerances(state: AppState) -> AppState:
-    own = state.origin.tolerances
-    # an edited machine may not have all axes of the scene's
-    kept = {key: own.individual[key] for key in own.individual if key in state.amplitudes}
-    return replace(state, tolerances=replace(own, individual=kept))
+    original = state.origin.tolerances
+    # an edited machine may lack axes of the scene
+    tolerances = {
+        key: original.individual[key] for key in original.individual if key in state.amplitudes
+    }
+    return replace(state, tolerances=replace(original, individual=tolerances))
 
 
 def with_scaled_tolerances(state: AppState, keys: Collection[str], factor: float) -> AppState:
-    """Widen or narrow tolerances in the same ratio; those that are fixed stay."""
-    half_widths = {
+    present = {key: half_width_of(state, key) for key in keys}
+    scaled = {
         key: min(half_width * factor, max(MAX_HALF_WIDTH, half_width))
-        for key in keys
-        if key not in state.specification.fixed and (half_width := half_width_of(state, key)) > 0.0
+        for key, half_width in present.items()
+        if key not in state.specification.fixed and half_width > 0.0
     }
-    return with_half_widths(state, half_widths)
+    return with_half_widths(state, scaled)
 
 
 def with_half_widths(state: AppState, half_widths: Mapping[str, float]) -> AppState:
-    """Set half widths of tolerances that the program has worked out, µm or µrad; centres stay."""
+    """Set computed half-widths, µm or µrad; the centres stay."""
     return replace(state, tolerances=state.tolerances.with_half_widths(half_widths))
 
 
 def with_sight(state: AppState, *, inside: bool) -> AppState:
-    """Draw grid lines in place of a closed surface, which would hide what is inside; and back."""
+    """Switch between grid lines, which show the inside of the box, and a closed surface."""
     before, after = ("surface", "grid") if inside else ("grid", "surface")
     if state.look.surface != before:
         return state

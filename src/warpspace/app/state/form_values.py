@@ -1,4 +1,4 @@
-"""What forms were told: options of analyses by ``NAME.OPTION``, and the standard test, ``test``."""
+"""Texts of the forms: options of analyses by ``NAME.OPTION``, and the standard test, ``test``."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -16,22 +16,21 @@ from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
 A = TypeVar("A", bound=Analysis)
-TEST = "test"  # the standard test that is run; its options begin with it, as those of an analysis
-MOST, LONGEST = 100, 1000  # entries, and characters of one
+TEST = "test"  # selected standard test; also the prefix of its options
+MAX_ENTRIES, LONGEST = 100, 1000  # entries, and characters of one
 _OPTION = re.compile(r"[a-z_]{1,40}")
 
 
 def linked_forms(state: AppState) -> list[tuple[str, str]]:
-    """List what links and files hold: not what belongs to files that were opened."""
     return [(name, text) for name, text in state.forms.items() if _is_known(name)]
 
 
 def with_form(state: AppState, name: str, text: str) -> AppState:
-    """Take what somebody typed, or a link says; raises `Unreadable`."""
+    """Set a form text from the page or a link; raises `Unreadable`."""
     if not _is_known(name) or (name == TEST and text not in bench_names()):
         raise Unreadable("expected an option of an analysis, or the name of a test")
-    if len(state.forms) >= MOST:
-        raise Unreadable(f"expected at most {MOST} options")
+    if len(state.forms) >= MAX_ENTRIES:
+        raise Unreadable(f"expected at most {MAX_ENTRIES} options")
     return replace(state, forms={**state.forms, name: text[:LONGEST]})
 
 
@@ -39,32 +38,31 @@ def _is_known(name: str) -> bool:
     part, dot, option = name.partition(".")
     if not dot:
         return name == TEST
-    known = part == TEST or part in {one.name for one in entries()}
-    return known and _OPTION.fullmatch(option) is not None
+    is_listed = part == TEST or part in {entry.name for entry in entries()}
+    return is_listed and _OPTION.fullmatch(option) is not None
 
 
 def option_values(state: AppState, name: str) -> dict[str, str]:
-    """Give what was told of the options of an analysis."""
-    own = f"{name}."
-    return {k.removeprefix(own): v for k, v in state.forms.items() if k.startswith(own)}
+    prefix = f"{name}."
+    return {k.removeprefix(prefix): v for k, v in state.forms.items() if k.startswith(prefix)}
 
 
 def read_form(
     kind: type[A], options: Sequence[Option], values: Mapping[str, str], scene: Scene
 ) -> A:
-    """Build an analysis from what was typed; an `OptionError` names an option as ``{name}``."""
-    given: dict[str, Any] = {}
-    for one in options:
-        text = values.get(one.name)
-        if text is None or (not text.strip() and one.kind is not bool):
+    """Build an analysis from texts; an `OptionError` refers to an option as ``{name}``."""
+    arguments: dict[str, Any] = {}
+    for option in options:
+        text = values.get(option.name)
+        if text is None or (not text.strip() and option.kind is not bool):
             continue
-        if one.kind is bool:
-            given[one.name] = text == "1"
-        elif one.kind in (int, float) and one.grammar is None:
-            number = read_typed(text, one.unit)
+        if option.kind is bool:
+            arguments[option.name] = text == "1"
+        elif option.kind in (int, float) and option.grammar is None:
+            number = read_typed(text, option.unit)
             if number is None:
-                raise OptionError(f"{{{one.name}}} {text!r}; expected a number")
-            given[one.name] = one.kind(number)
+                raise OptionError(f"{{{option.name}}} {text!r}; expected a number")
+            arguments[option.name] = option.kind(number)
         else:
-            given[one.name] = one.read(text, scene)
-    return kind(**given)
+            arguments[option.name] = option.read(text, scene)
+    return kind(**arguments)

@@ -1,6 +1,6 @@
-"""What a field of the state says of itself where it stands: words, kind, choices, range, link name.
+"""Descriptions of state fields: label, kind, choices, range, name in links.
 
-`warpspace.app.state.tree` makes leaves of it: for widgets, links, saved files and undo alike.
+`warpspace.app.state.tree` turns them into leaves for widgets, links, files and undo.
 """
 
 import math
@@ -17,21 +17,21 @@ Choices: TypeAlias = Mapping[str, str]
 DESCRIBED = "described"
 
 
-class Unreadable(ValueError):  # noqa: N818 - it is handled where text is read
-    """A text that means nothing; it says what was expected."""
+class Unreadable(ValueError):  # noqa: N818 - handled where texts are parsed
+    """An invalid text; the message states what was expected."""
 
 
 class Identity:
-    """An object as part of a key, compared by identity (and held, so that its id stays its own)."""
+    """An object as part of a key, compared by identity; referenced, so that its id stays unique."""
 
-    def __init__(self, thing: Any) -> None:
-        self.thing = thing
+    def __init__(self, target: Any) -> None:
+        self.target = target
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Identity) and other.thing is self.thing
+        return isinstance(other, Identity) and other.target is self.target
 
     def __hash__(self) -> int:
-        return id(self.thing)
+        return id(self.target)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,53 +41,53 @@ class Span:
     step: float  # distance between two positions of a slider
 
     def clamp(self, value: float, fallback: float) -> float:
-        """Bring a number that may be anything into the range; what is no number falls back."""
+        """Clamp any number to the range; NaN gives the fallback."""
         if math.isnan(value):
             return fallback
-        kept = min(max(value, self.low), self.high)
-        return 0.0 if 0.0 < abs(kept) < MIN_NUMBER else kept
+        clamped = min(max(value, self.low), self.high)
+        return 0.0 if 0.0 < abs(clamped) < MIN_NUMBER else clamped
 
-    def clamped_words(self, value: float, kept: float, what: str, unit: str) -> str:
+    def clamped_words(self, value: float, clamped: float, name: str, unit: str) -> str:
         allowed = f"{self.low:g} to {self.high:g} {unit}".rstrip()
-        shown = f"{kept:g} {unit}".rstrip()
-        return f"{what} = {value:g} is outside {allowed}; clamped to {shown}"
+        text = f"{clamped:g} {unit}".rstrip()
+        return f"{name} = {value:g} is outside {allowed}; clamped to {text}"
 
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """One value of a state that somebody may set, or one entry of a mapping of them."""
+    """A value of the state that users may set, or an entry of a mapping of such values."""
 
-    path: str  # "look.surface", "amplitudes.EA0Z"; of a field that describes itself empty
-    label: str  # what a user reads, also beside a step that is undone
+    path: str  # "look.surface", "amplitudes.EA0Z"; empty in the metadata of a field
+    label: str  # on the page, also of undo steps
     # "switch", "choice", "number", "text", "keys" (some of its choices), "names" (a set of any
-    # words), "point" (three numbers or none), "numbers", "lines" (of text); empty where only
-    # changes have a name
+    # names), "point" (three numbers or none), "numbers", "lines" (of text); empty for fields that
+    # have a label only
     kind: str = ""
-    # values with their words; of a number the one that stands in place of it, "auto"
+    # labels by value; of a number its alternative, "auto"
     choices: Choices = field(default_factory=dict[str, str])
     span: Span | None = None
     unit: str = ""
     hint: str = ""
-    linked: str = ""  # name in links and files; empty where it stands in none
-    one: str = "{}"  # label of one entry or member; ``{}`` is its name
-    # of a field whose choices, or whose entries with their ranges, depend on the state
+    linked: str = ""  # name in links and files; empty where it is not stored
+    item_label: str = "{}"  # of an entry or a member; ``{}`` is its name
+    # for choices, or entries with ranges, that depend on the state
     choose: Callable[[Any], Choices] | None = None
     each: Callable[[Any], Mapping[str, Span | None]] | None = None
 
 
-def said(
-    label: str, *, choices: Choices | Callable[[Any], Choices] | None = None, **words: Any
+def describe(
+    label: str, *, choices: Choices | Callable[[Any], Choices] | None = None, **attributes: Any
 ) -> dict[str, Leaf]:
-    """Give the metadata of a field; in `linked`, ``{path}`` and ``{key}`` (of an entry) are put."""
-    words = {"linked": "{path}", **words}
+    """Build the metadata of a field; `linked` may contain ``{path}`` and ``{key}``."""
+    attributes = {"linked": "{path}", **attributes}
     if choices is not None:
-        words["choose" if callable(choices) else "choices"] = choices
-    return {DESCRIBED: Leaf("", label, **words)}
+        attributes["choose" if callable(choices) else "choices"] = choices
+    return {DESCRIBED: Leaf("", label, **attributes)}
 
 
-def described(default: T, label: str, **words: Any) -> T:
-    """Give a field with a default; its kind follows from that where none is said."""
-    has_choices = bool(words.get("choices"))
+def described(default: T, label: str, **attributes: Any) -> T:
+    """Build a field with a default, which determines the kind unless given."""
+    has_choices = bool(attributes.get("choices"))
     if isinstance(default, bool):
         kind = "switch"
     elif isinstance(default, frozenset):
@@ -96,8 +96,8 @@ def described(default: T, label: str, **words: Any) -> T:
         kind = "choice"
     else:
         kind = "text" if isinstance(default, str) else "number"
-    words = {"kind": kind, **words}
-    return field(default_factory=lambda: default, metadata=said(label, **words))
+    attributes = {"kind": kind, **attributes}
+    return field(default_factory=lambda: default, metadata=describe(label, **attributes))
 
 
 def description(entry: "Field[Any]") -> Leaf | None:
@@ -115,7 +115,7 @@ def error_names(state: Any) -> dict[str, str]:
 
 
 def name_of(key: str) -> str:
-    """Give the plain name of an error; anything else as it is."""
+    """Return the descriptive name of an error; other names unchanged."""
     row = PARAMETERS.get(key)
     return key if row is None else row.name
 

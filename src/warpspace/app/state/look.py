@@ -1,4 +1,4 @@
-"""How the field, the machine and its traces are looked at, and where in a scene the axes stand."""
+"""Display settings of field, machine and traces, and ranges and positions of the axes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -31,22 +31,22 @@ POINT_MM = Span(-2000.0, 2000.0, 1.0)
 class Look:
     surface: str = described("surface", "Surface", choices=SURFACES)
     quantity: str = described("position", "Quantity", choices=QUANTITIES)
-    # round ends for what is shown; those of `range_top`; or one range for all components, for now
-    # and for the scene as opened
+    # round ends of the present values; `range_top`; or one range for all components of the present
+    # errors and of those as opened
     range_mode: str = described("auto", "Colour range", choices=RANGES)
     range_top: float = described(
         START_TOP,
         "End of the colour range",
         span=RANGE_TOP,
-        hint="End of a fixed range, µm or µrad; signed components run from minus to plus.",
+        hint="End of a fixed range, µm or µrad; signed components use ± this value.",
     )
     isolines: bool = described(
         False, "Isolines", hint="Lines of equal value at the numbers of the colour bar."
     )
     arrows: bool = described(
-        False, "Corner arrows", hint="Displacement of the eight corners, with its length."
+        False, "Corner arrows", hint="Displacements of the eight corners, with their lengths."
     )
-    worst: bool = described(True, "Worst point", hint="Where the coloured value is largest.")
+    worst: bool = described(True, "Worst point", hint="Point of the largest coloured value.")
     bars: bool = described(
         True, "Scale bars", hint="Two lengths in the picture: geometry in mm, error in µm."
     )
@@ -62,15 +62,15 @@ class Look:
         " is: their extent along a direction is U95 of the error along it.",
     )
     unmeasured: bool = described(
-        True, "Never measured", hint="Dots where axes stood at no time while it was measured."
+        True, "Never measured", hint="Dots at axis positions that no measurement covers."
     )
-    # which part of the volume keeps the limit, and which does not
+    # colours by compliance with the limit
     pass_fail: bool = described(False, "Pass or fail")
-    # an axis not given in the middle of its range
+    # an axis without entry is in the middle of its range
     slices_mm: Mapping[str, float] = described(
         dict[str, float](),
         "Slices",
-        one="Slice across {}",
+        item_label="Slice across {}",
         each=lambda state: slice_spans(state.scene),
     )
     follow: bool = described(
@@ -81,13 +81,13 @@ class Look:
 
     @property
     def tilts(self) -> bool:
-        """Whether the orientation error of the tool axis is coloured, not the position error."""
+        """True where the orientation error of the tool axis is coloured, not the position error."""
         return self.quantity == "orientation"
 
 
 @dataclass(frozen=True, slots=True)
 class MachineLook:
-    """The schematic machine: its bodies, or these nearly transparent, around the volume."""
+    """Display of the machine: its bodies, or transparent ones around the volume."""
 
     shown: bool = described(False, "Machine bodies")
     bent: bool = described(
@@ -97,11 +97,11 @@ class MachineLook:
         " box is. Off: nominal.",
     )
     ghost: bool = described(True, "Ghost of the machine")
-    # an axis not given in the middle of its workspace
+    # an axis without entry is in the middle of its workspace
     linear_mm: Mapping[str, float] = described(
         dict[str, float](),
         "Positions of the machine",
-        one="Machine {}",
+        item_label="Machine {}",
         each=lambda state: linear_spans(state.scene),
         hint="Position of the axis; moves the bodies and the tool point.",
     )
@@ -109,12 +109,12 @@ class MachineLook:
 
 @dataclass(frozen=True, slots=True)
 class RotaryLook:
-    """Which points are traced, and where the axes stand that do not turn."""
+    """Traced points, and positions of the rotary axes that are held."""
 
-    # by their numbers among the scene's trace points
+    # indices into the trace points of the scene
     off: frozenset[str] = described(
         frozenset[str](),
-        "Points that are not traced",
+        "Points without trace",
         choices=lambda state: {
             str(number): f"({', '.join(map(spell_short, point))}) mm"
             for number, point in enumerate(state.scene.trace_points_mm)
@@ -122,40 +122,36 @@ class RotaryLook:
     )
     own_mm: Vector | None = described(
         None,
-        "Traced point of one's own",
+        "Custom traced point",
         kind="point",
         span=POINT_MM,
         unit="mm",
         linked="rotary.own",
         hint="x, y and z in the workpiece frame; empty for none.",
     )
-    # degrees; an axis not given where `warpspace.picture.traces` puts it
+    # degrees; the default is set by `warpspace.picture.traces`
     held: Mapping[str, tuple[float, ...]] = described(
         dict[str, tuple[float, ...]](),
-        "Positions that rotary axes are held at",
+        "Positions of held rotary axes",
         kind="numbers",
-        one="{} held at",
+        item_label="{} held at",
         each=lambda state: state.position_spans,
-        hint="Positions while the other rotary axis turns, separated by commas; empty for a few"
+        hint="Positions while the other rotary axis rotates, separated by commas; empty for a few"
         " around the present one.",
     )
-    # the trace in colour; a name of none of them (`picture.traces.name_trace`) lets the app choose
+    # coloured trace (`picture.traces.name_trace`); for other names the app selects one
     chosen: str = described("", "Trace")
 
     def points_mm(self, scene: Scene) -> tuple[Vector, ...]:
-        """List the points that are traced, mm in the workpiece frame."""
-        found = [p for n, p in enumerate(scene.trace_points_mm) if str(n) not in self.off]
-        return (*found, *(() if self.own_mm is None else (self.own_mm,)))
+        points = [p for n, p in enumerate(scene.trace_points_mm) if str(n) not in self.off]
+        return (*points, *(() if self.own_mm is None else (self.own_mm,)))
 
 
-# --- Where the axes of a scene can stand, and where they do ---------------------------------------
+# --- Ranges and positions of the axes -------------------------------------------------------------
 
 
 def position_spans(scene: Scene) -> dict[str, Span]:
-    """Give the ranges of the rotary axes that the volume is drawn at, degrees, by axis.
-
-    Rotary axes that span the volume are not among them.
-    """
+    """Return the ranges of the rotary axes that do not span the volume, degrees, by axis."""
     return _spans(scene, within=False)
 
 
@@ -165,22 +161,18 @@ def slice_spans(scene: Scene) -> dict[str, Span]:
 
 
 def linear_spans(scene: Scene) -> dict[str, Span]:
-    """Give the ranges of the axes that move within the volume, mm or degrees.
-
-    These are the linear axes, and rotary ones that span the volume.
-    """
+    """Return the ranges of linear axes and of rotary axes that span the volume, mm or degrees."""
     return _spans(scene, within=True)
 
 
 def _spans(scene: Scene, *, within: bool) -> dict[str, Span]:
-    """Give the travels of axes, widened where the workspace reaches beyond."""
-    found: dict[str, Span] = {}
+    spans: dict[str, Span] = {}
     for name, axis in scene.machine.axes.items():
         if (axis.is_linear or name in scene.workspace.volume_axes) is within:
             low, high = axis.travel
             first, last = scene.workspace.ranges.get(name, (low, high))
-            found[name] = Span(min(low, first), max(high, last), 1.0)
-    return found
+            spans[name] = Span(min(low, first), max(high, last), 1.0)
+    return spans
 
 
 def clamped(spans: Mapping[str, Span], positions: Mapping[str, float]) -> dict[str, float]:
@@ -188,7 +180,7 @@ def clamped(spans: Mapping[str, Span], positions: Mapping[str, float]) -> dict[s
 
 
 def linear_positions(scene: Scene, look: MachineLook) -> dict[str, float]:
-    """Give where the linear axes of a scene stand, mm, always within their ranges."""
+    """Return the positions of the linear axes, mm, clamped to their ranges."""
     at = {**scene.workspace.positions, **look.linear_mm}
     return {axis: span.clamp(at.get(axis, 0.0), 0.0) for axis, span in linear_spans(scene).items()}
 

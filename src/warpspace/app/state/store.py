@@ -1,7 +1,7 @@
-"""The state that one tab, or all tabs of a shared review, look at and steer; a history per tab.
+"""The state of one tab, or of all tabs of a shared review, and the history of each tab.
 
-Sessions read their widgets and apply what has changed to the present state, under a lock: nobody
-overwrites what somebody else has just done with an older state of the whole.
+Updates are applied to the present state under a lock, so that no tab overwrites a change of another
+one with an older state.
 """
 
 import gc
@@ -16,54 +16,60 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from warpspace.app.state.app_state import AppState, Exclusions, PartLook, Shown, Specification
+from warpspace.app.state.app_state import (
+    AppState,
+    DisplayOptions,
+    Exclusions,
+    PageLook,
+    PartLook,
+    Specification,
+)
 from warpspace.app.state.leaf import description, lowered, name_of
 from warpspace.app.state.look import Look, MachineLook, RotaryLook
 from warpspace.app.state.tree import leaves, stored
 from warpspace.exceptions import OptionError
 from warpspace.machine.errors import ToleranceSet
 
-# --- What differs between two states --------------------------------------------------------------
-
+# --- Differences of two states --------------------------------------------------------------------
 
 _COMPARED = [entry for entry in fields(AppState) if entry.compare]
 
 
 def changes(old: AppState, new: AppState) -> dict[str, str]:
-    """Say in words what differs between two states, each by its path; page and forms do not."""
-    found: dict[str, str] = {}
+    """List the differences of two states, labels by path; page and forms are not compared."""
+    labels: dict[str, str] = {}
     for entry in _COMPARED:
-        before, after = getattr(old, entry.name), getattr(new, entry.name)
-        if before is after or _equal(before, after):
+        if _equal(getattr(old, entry.name), getattr(new, entry.name)):
             continue
-        own = description(entry)
-        # what differs within a scene, say, has no name
-        inner = {} if own and not own.kind else dict(_leaf_changes(old, new, entry.name))
-        found |= inner or {entry.name: lowered(own.label) if own else entry.name}
-    one, other = old.scene, new.scene
-    if one.name == other.name and not (
-        _equal(one.machine, other.machine) and _equal(one.workspace, other.workspace)
+        leaf = description(entry)
+        # differences within a scene, for instance, have no labels of their own
+        inner = {} if leaf and not leaf.kind else dict(_leaf_changes(old, new, entry.name))
+        labels |= inner or {entry.name: lowered(leaf.label) if leaf else entry.name}
+    before, after = old.scene, new.scene
+    if before.name == after.name and not (
+        _equal(before.machine, after.machine) and _equal(before.workspace, after.workspace)
     ):
         return {"scene": "machine"}
-    # what it is compared with has changed with it
-    return {"controller": found["controller"]} if "controller" in found else found
+    # a table ends the comparison
+    return {"controller": labels["controller"]} if "controller" in labels else labels
 
 
 def _leaf_changes(old: AppState, new: AppState, group: str) -> Iterator[tuple[str, str]]:
-    was, now, known = getattr(old, group), getattr(new, group), leaves(new)
-    if isinstance(now, Mapping):  # of many entries, most of which stay
+    was, now, described = getattr(old, group), getattr(new, group), leaves(new)
+    if isinstance(now, Mapping):  # most of many entries are unchanged
         keys = [key for key, value in now.items() if was.get(key) is not value]
         paths = [f"{group}.{key}" for key in (*keys, *(was.keys() - now.keys()))]
     else:
-        paths = [path for path in known if path.partition(".")[0] == group]
+        paths = [path for path in described if path.partition(".")[0] == group]
     for path in paths:
-        if (leaf := known.get(path)) is None:
+        leaf = described.get(path)
+        if leaf is None:
             continue
         before, after = stored(old, path), stored(new, path)
         if isinstance(before, frozenset) and isinstance(after, frozenset):
             for name in sorted(before ^ after):
                 sign = "+" if name in after else "-"
-                yield f"{path}.{sign}{name}", lowered(leaf.one.format(name_of(name)))
+                yield f"{path}.{sign}{name}", lowered(leaf.item_label.format(name_of(name)))
         elif not _equal(before, after):
             yield path, lowered(leaf.label)
 
@@ -75,110 +81,98 @@ def _equal(old: object, new: object) -> bool:
         return False
 
 
-# --- A change of one state applied to another -----------------------------------------------------
+# --- Merging a change into another state ----------------------------------------------------------
 
-_MERGED = (Exclusions, Look, MachineLook, PartLook, RotaryLook, Shown, Specification, ToleranceSet)
-"""What two users may change at once, field by field; a scene is changed as a whole."""
+_MERGED = (DisplayOptions, Exclusions, Look, MachineLook, PartLook, RotaryLook, Specification,
+           ToleranceSet)  # fmt: skip
+"""Merged field by field; all other objects, such as a scene, as a whole."""
 _MISSING = object()
 
 
-def carried(old: AppState, new: AppState, present: AppState) -> AppState:
+def merged(old: AppState, new: AppState, present: AppState) -> AppState:
     """Apply the change from an old state to a new one to the present state; its page stays.
 
-    Raises `OptionError` where somebody else has changed the same.
+    Raises `OptionError` where another tab has changed the same value.
     """
+    states = old, new, present
     names = [entry.name for entry in _COMPARED if entry.name != "review"]
-    values = {name: _carried(*(getattr(s, name) for s in (old, new, present))) for name in names}
-    notes = _carried(*({note.id: note for note in s.review} for s in (old, new, present)))
+    values = {name: _merge(*(getattr(state, name) for state in states)) for name in names}
+    notes = _merge(*({note.id: note for note in state.review} for state in states))
     return replace(present, **values, review=tuple(notes.values()))
 
 
-def _carried(old: Any, new: Any, present: Any) -> Any:
-    if _equal(old, new):
+def _merge(old: Any, new: Any, present: Any) -> Any:
+    if _equal(old, new) or _equal(new, present):
         return present
     if _equal(old, present):
         return new
-    if _equal(new, present):
-        return present
-    states = old, new, present
-    if all(isinstance(one, frozenset) for one in states):
+    kinds = {type(old), type(new), type(present)}
+    if kinds == {frozenset}:
         return (present - (old - new)) | (new - old)
-    if all(isinstance(one, Mapping) for one in states):
-        order = {**present, **new} if old.keys() == new.keys() else {**new, **present}
-        entries = {key: _carried(*(one.get(key, _MISSING) for one in states)) for key in order}
+    if all(issubclass(kind, Mapping) for kind in kinds):
+        # amplitudes stay in the order of the present machine
+        keys = {**present, **new} if old.keys() == new.keys() else {**new, **present}
+        entries = {
+            key: _merge(*(side.get(key, _MISSING) for side in (old, new, present))) for key in keys
+        }
         return {key: entry for key, entry in entries.items() if entry is not _MISSING}
-    if not isinstance(old, _MERGED) or not type(old) is type(new) is type(present):
-        raise OptionError("somebody else has changed the same since; it stays as it is")
+    if len(kinds) > 1 or not isinstance(old, _MERGED):
+        raise OptionError("somebody else has changed it since; it is left unchanged")
     names = [entry.name for entry in fields(old)]
-    values = {name: _carried(*(getattr(one, name) for one in states)) for name in names}
+    values = {
+        name: _merge(*(getattr(side, name) for side in (old, new, present))) for name in names
+    }
     return replace(present, **values)
 
 
 # --- Undo and redo --------------------------------------------------------------------------------
-# What a slider drag sends in quick succession becomes one step. The steps of a tab are bounded in
-# number and in the memory that only they hold.
+# The changes of a slider drag form one step. The steps of a tab are limited in number and in the
+# memory that only they hold.
 
-STEPS = 100  # steps that can be undone; the oldest are forgotten
+STEPS = 100  # steps that can be undone
 STEPS_BYTES = 128 * 2**20  # held by the steps of a tab; the latest step stays
-SAME_STEP_S = 0.8  # changes of one thing that follow each other faster than this are one step
+SAME_STEP_S = 0.8  # longest time between two changes of one step
 _LARGE = ("scene", "loaded", "part", "comparison", "controller")
 _COMMON = (type, ModuleType, FunctionType)
 
 
-def _held_bytes(thing: object, known: set[int]) -> int:
-    """Return the memory that an object holds beside those that are known."""
-    total, waiting = 0, [thing]
+def _sizes(state: AppState) -> dict[int, int]:
+    """Return the sizes of all objects that a state refers to, by their ids."""
+    sizes, waiting = dict[int, int](), list[object]([state])
     while waiting:
         latest = waiting.pop()
-        if id(latest) not in known and not isinstance(latest, _COMMON):
-            known.add(id(latest))
-            total += latest.nbytes if isinstance(latest, np.ndarray) else sys.getsizeof(latest)
+        if id(latest) not in sizes and not isinstance(latest, _COMMON):
+            is_array = isinstance(latest, np.ndarray)
+            sizes[id(latest)] = latest.nbytes if is_array else sys.getsizeof(latest)
             waiting += gc.get_referents(latest)
-    return total
+    return sizes
 
 
 def _size_bytes(before: AppState, after: AppState) -> int:
-    """Return the memory that either of two states holds and the other does not."""
+    """Return the memory that only one of two states holds; of both the larger number."""
     if all(getattr(before, name) is getattr(after, name) for name in _LARGE):
         return 0
-    sizes: list[int] = []
-    for state, other in ((before, after), (after, before)):
-        known = set[int]()
-        _held_bytes(other, known)
-        sizes.append(_held_bytes(state, known))
-    return max(sizes)
+    old, new = _sizes(before), _sizes(after)
+    return max(
+        sum(size for key, size in old.items() if key not in new),
+        sum(size for key, size in new.items() if key not in old),
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class UndoStep:
     before: AppState
     after: AppState
-    what: Mapping[str, str]
+    changed: Mapping[str, str]
     size_bytes: int
 
     @property
-    def words(self) -> str:
-        found = list(dict.fromkeys(self.what.values()))
-        if "scene" in self.what:  # its curves change with an error
-            errors = {said for path, said in self.what.items() if path.startswith("amplitudes.")}
-            found = list(errors) if len(errors) == 1 else [self.what["scene"]]
-        return found[0] if len(found) == 1 else f"{found[0]} and {len(found) - 1} more"
-
-
-Steps: TypeAlias = tuple[UndoStep, ...]
-
-
-def _bounded(steps: Steps) -> Steps:
-    steps = steps[-STEPS:]
-    while len(steps) > 1 and sum(step.size_bytes for step in steps) > STEPS_BYTES:
-        steps = steps[1:]
-    return steps
-
-
-def _on_page(state: AppState, other: AppState) -> AppState:
-    if (state.page, state.forms) == (other.page, other.forms):
-        return state
-    return replace(state, page=other.page, forms=other.forms)
+    def label(self) -> str:
+        labels = list(dict.fromkeys(self.changed.values()))
+        if "scene" in self.changed:  # its curves change with an error
+            errors = {text for path, text in self.changed.items() if path.startswith("amplitudes.")}
+            labels = list(errors) if len(errors) == 1 else [self.changed["scene"]]
+        return labels[0] if len(labels) == 1 else f"{labels[0]} and {len(labels) - 1} more"
 
 
 Update: TypeAlias = Callable[[AppState], AppState]
@@ -187,29 +181,30 @@ Listener: TypeAlias = Callable[[], None]
 
 @dataclass(slots=True)
 class _Document:
-    """What all tabs of a shared review look at."""
+    """The state, as all tabs of a shared review share it."""
 
-    state: AppState  # what is shown, or about to be
-    listeners: tuple[Listener, ...] = ()
+    state: AppState  # shown, or about to be
+    listeners: set[Listener] = field(default_factory=set[Listener])
     is_edited: bool = False
     lock: threading.Lock = field(default_factory=threading.Lock)
 
 
-class Mark(NamedTuple):
-    """A state with the history of a tab, to go back to."""
+class Checkpoint(NamedTuple):
+    """A state with history and page of a tab, which `StateStore.restore` goes back to."""
 
     state: AppState
-    past: Steps
-    future: Steps
+    past: tuple[UndoStep, ...]
+    future: tuple[UndoStep, ...]
+    page: PageLook
 
 
 class StateStore:
-    """A state with the past and the future of one tab; tabs of a shared review share the state."""
+    """A state with the history of one tab; tabs of a shared review share the state."""
 
     def __init__(self, state: AppState, document: _Document | None = None) -> None:
         self._document = document or _Document(state)
-        self.past: Steps = ()  # latest last
-        self.future: Steps = ()
+        self.past: list[UndoStep] = []  # latest last
+        self.future: list[UndoStep] = []
         self._changed_at = float("-inf")
 
     @property
@@ -218,99 +213,97 @@ class StateStore:
 
     @property
     def is_edited(self) -> bool:
-        """Whether anybody has changed the state."""
         return self._document.is_edited
 
     @property
     def size_bytes(self) -> int:
-        """Memory that its history holds."""
         return sum(step.size_bytes for step in (*self.past, *self.future))
 
     @property
     def undoes(self) -> str:
-        """What undo would take back, in words; empty where there is nothing."""
-        return self.past[-1].words if self.past else ""
+        """Label of the step that undo would revert; empty where there is none."""
+        return self.past[-1].label if self.past else ""
 
     @property
     def redoes(self) -> str:
-        return self.future[-1].words if self.future else ""
+        return self.future[-1].label if self.future else ""
 
     def apply(
         self, update: Update, by: Listener | None = None, at: float | None = None
     ) -> tuple[str, ...]:
-        """Apply a pure update to the present state; give what it had to clamp."""
+        """Apply a pure update to the present state; return its notes on values it clamped."""
         with self._document.lock:
-            before, found = self.state, update(self.state)
-            self._push(found.without_notes(), time.monotonic() if at is None else at)
-            changed = self.state is not before
-        if changed:
+            before, updated = self.state, update(self.state)
+            self._push(updated.without_notes(), time.monotonic() if at is None else at)
+            is_changed = self.state is not before
+        if is_changed:
             self._notify(by)
-        return found.notes
+        return updated.notes
 
     def _push(self, state: AppState, at: float) -> None:
         document, before = self._document, self.state
-        what = changes(before, state)
-        if not what:
-            document.state = _on_page(before, state)
+        changed = changes(before, state)
+        if not changed:
+            if (state.page, state.forms) != (before.page, before.forms):
+                document.state = replace(before, page=state.page, forms=state.forms)
             return
-        steps, alone = self.past, {"scene", "review"} & what.keys()
-        same = steps and not self.future and steps[-1].what == what and not alone
-        if same and at - self._changed_at < SAME_STEP_S:
-            with suppress(OptionError):  # with what others have changed meanwhile
-                before, steps = carried(steps[-1].after, steps[-1].before, before), steps[:-1]
-        step = UndoStep(before, state, what, _size_bytes(before, state))
-        self.past, self.future, self._changed_at = _bounded((*steps, step)), (), at
+        past = self.past
+        is_same = past and not self.future and past[-1].changed == changed
+        if is_same and at - self._changed_at < SAME_STEP_S and not {"scene", "review"} & {*changed}:
+            with suppress(OptionError):  # with the changes of other tabs since
+                before = merged(past[-1].after, past[-1].before, before)
+                past.pop()
+        past.append(UndoStep(before, state, changed, _size_bytes(before, state)))
+        del past[:-STEPS]
+        while len(past) > 1 and sum(step.size_bytes for step in past) > STEPS_BYTES:
+            del past[0]
+        self.future, self._changed_at = [], at
         document.state, document.is_edited = state, True
 
     def undo(self) -> str:
-        """Take the latest change of this tab back; give what it was.
+        """Revert the latest change of this tab; return its label.
 
-        Where somebody else has changed the same since, the step is forgotten with an `OptionError`.
+        Where another tab has changed the same value since, the step is dropped with an
+        `OptionError`.
         """
-        return self._travel(back=True)
+        return self._travel(self.past, self.future, is_undo=True)
 
     def redo(self) -> str:
-        """Do again what was undone; give what it was; raises as `undo`."""
-        return self._travel(back=False)
+        """Apply the change that was undone last; return its label; raises as `undo`."""
+        return self._travel(self.future, self.past, is_undo=False)
 
-    def _travel(self, *, back: bool) -> str:
+    def _travel(self, source: list[UndoStep], target: list[UndoStep], *, is_undo: bool) -> str:
         with self._document.lock:
             self._changed_at = float("-inf")
-            steps = self.past if back else self.future
-            if not steps:
+            if not source:
                 return ""
-            step, left = steps[-1], steps[:-1]
-            sides = (step.after, step.before) if back else (step.before, step.after)
-            self.past, self.future = (left, self.future) if back else (self.past, left)
+            step = source.pop()
+            sides = (step.after, step.before) if is_undo else (step.before, step.after)
             try:
-                self._document.state = carried(*sides, self.state)
+                self._document.state = merged(*sides, self.state)
             except OptionError as error:
-                raise OptionError(f"{step.words}: {error}") from None
-            if back:
-                self.future = (*self.future, step)
-            else:
-                self.past = (*self.past, step)
+                raise OptionError(f"{step.label}: {error}") from None
+            target.append(step)
         self._notify(None)
-        return step.words
+        return step.label
 
-    def mark(self) -> Mark:
-        """Return what `back_to` goes back to."""
-        return Mark(self.state, self.past, self.future)
+    def checkpoint(self, page: PageLook) -> Checkpoint:
+        return Checkpoint(self.state, tuple(self.past), tuple(self.future), page)
 
-    def back_to(self, mark: Mark, failed: AppState) -> bool:
+    def restore(self, checkpoint: Checkpoint, failed: AppState) -> bool:
         """Replace a state that cannot be evaluated; False where it is not the present one."""
         with self._document.lock:
-            if self.state is not failed or failed is mark.state:
+            if self.state is not failed or failed is checkpoint.state:
                 return False
-            self._document.state, self.past, self.future = mark
+            self._document.state = checkpoint.state
+            self.past, self.future = [*checkpoint.past], [*checkpoint.future]
             self._changed_at = float("-inf")
         self._notify(None)
         return True
 
     def copy(self) -> "StateStore":
-        """Give a store of its own with the same state and history."""
         store = StateStore(self.state)
-        store.past, store.future = self.past, self.future
+        store.past, store.future = [*self.past], [*self.future]
         return store
 
     def joined(self) -> "StateStore":
@@ -318,16 +311,13 @@ class StateStore:
         return StateStore(self.state, self._document)
 
     def subscribe(self, listener: Listener) -> None:
-        """Have a callable called (from any thread; it must return at once) after every change."""
-        with self._document.lock:
-            self._document.listeners += (listener,)
+        """Call a listener, which must return at once, after every change, from any thread."""
+        self._document.listeners.add(listener)
 
     def unsubscribe(self, listener: Listener) -> None:
-        with self._document.lock:
-            left = tuple(known for known in self._document.listeners if known != listener)
-            self._document.listeners = left
+        self._document.listeners.discard(listener)
 
     def _notify(self, by: Listener | None) -> None:
-        for listener in self._document.listeners:
+        for listener in tuple(self._document.listeners):
             if listener != by:
                 listener()

@@ -1,7 +1,7 @@
-"""The state as one tree of described values: what widgets, links, saved files and undo walk.
+"""The state as a tree of described values, for widgets, links, files and undo.
 
-A leaf is named by its path, ``look.surface`` or ``amplitudes.EA0Z``. `put` takes whatever a browser
-sends for it; `spell` gives the text that is read back to the same value.
+A leaf is identified by its path, ``look.surface`` or ``amplitudes.EA0Z``. `put` sets it from any
+text of a browser; `spell` returns the text that is read back to the same value.
 """
 
 import math
@@ -31,23 +31,23 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import axis_order, parameter
 from warpspace.machine.limits import COST, MAX_HALF_WIDTH, MIN_HALF_WIDTH
 
-LONGEST = 4000  # characters that are read
-SHOWN = 40  # characters of a text that a note shows
+LONGEST = 4000  # characters of a text; others are ignored
+MAX_QUOTED = 40  # characters of a text in a note
 
 # --- The leaves of a state ------------------------------------------------------------------------
 
 
 def leaves(state: AppState) -> Mapping[str, Leaf]:
-    """Give the leaves of a state by their paths; the same object until what they say changes."""
+    """Return the leaves of a state by path; the same object until they change."""
     return _leaves(Identity(state.scene), state.look.quantity)
 
 
 @lru_cache(maxsize=32)
 def _leaves(scene: Identity, quantity: str) -> Mapping[str, Leaf]:
-    state = start_state(scene.thing)
+    state = start_state(scene.target)
     state = replace(state, look=replace(state.look, quantity=quantity))
-    found = [leaf for entry in fields(AppState) for leaf in _described(state, entry)]
-    return {leaf.path: leaf for leaf in (*found, *_picked_leaves(state))}
+    described = [leaf for entry in fields(AppState) for leaf in _described(state, entry)]
+    return {leaf.path: leaf for leaf in (*described, *_picked_leaves(state))}
 
 
 def _described(state: AppState, entry: "Field[Any]", prefix: str = "") -> Iterator[Leaf]:
@@ -62,8 +62,8 @@ def _described(state: AppState, entry: "Field[Any]", prefix: str = "") -> Iterat
     else:
         for key, span in leaf.each(state).items():
             at = f"{path}.{key}"
-            label, linked = leaf.one.format(name_of(key)), leaf.linked.format(path=at, key=key)
-            unit = _unit(state, key)
+            label, unit = leaf.item_label.format(name_of(key)), _unit(state, key)
+            linked = leaf.linked.format(path=at, key=key)
             yield replace(leaf, path=at, label=label, span=span, unit=unit, linked=linked)
 
 
@@ -80,11 +80,11 @@ def _picked_leaves(state: AppState) -> Iterator[Leaf]:
         yield Leaf(path, label, "number", span=span, unit=unit, linked=f"why.{axis}")
 
 
-# --- Values, and how they are spelt ---------------------------------------------------------------
+# --- Values and their texts -----------------------------------------------------------------------
 
 
 def value(state: AppState, path: str) -> Any:
-    """Give the value of a leaf; of an entry that was not set the one that counts in its place."""
+    """Return the value of a leaf; of an entry that is not set its effective value."""
     group, _, key = path.rpartition(".")
     if group == "look.slices_mm":
         return slice_positions(state.scene, state.look, state.machine)[key]
@@ -94,7 +94,7 @@ def value(state: AppState, path: str) -> Any:
 
 
 def stored(state: AppState, path: str) -> Any:
-    """Give what a state holds at a path; None for an entry that was not set."""
+    """Return the stored value at a path; None for an entry that is not set."""
     group, _, key = path.rpartition(".")
     if group == "tolerances":
         return edits.half_width_of(state, key)
@@ -103,29 +103,29 @@ def stored(state: AppState, path: str) -> Any:
         if picked is None or picked.point_mm is None:
             return None
         return f"{picked.loop},{_spell_numbers(picked.point_mm)}"
-    found: Any = state
+    branch: Any = state
     for name in path.split("."):
-        found = found.get(name) if isinstance(found, Mapping) else getattr(found, name, None)
-    return found
+        branch = branch.get(name) if isinstance(branch, Mapping) else getattr(branch, name, None)
+    return branch
 
 
 def spell(state: AppState, path: str) -> str:
     return spell_value(leaves(state)[path], value(state, path))
 
 
-def spell_value(leaf: Leaf, found: Any) -> str:
-    """Spell a value; numbers to the last bit."""
-    if isinstance(found, Picked):
-        return " ".join(f"{axis} {at!r}" for axis, at in found.at.items())
-    if found is None:
+def spell_value(leaf: Leaf, setting: Any) -> str:
+    """Format a value; numbers to the last bit."""
+    if isinstance(setting, Picked):
+        return " ".join(f"{axis} {at!r}" for axis, at in setting.at.items())
+    if setting is None:
         return next(iter(leaf.choices), "")
-    if isinstance(found, bool):
-        return "1" if found else "0"
-    if isinstance(found, frozenset):
-        return ",".join(sorted(cast("frozenset[str]", found)))
-    if isinstance(found, tuple):
-        return _spell_numbers(cast("tuple[float, ...]", found))
-    return repr(found) if isinstance(found, float) else str(found)
+    if isinstance(setting, bool):
+        return "1" if setting else "0"
+    if isinstance(setting, frozenset):
+        return ",".join(sorted(cast("frozenset[str]", setting)))
+    if isinstance(setting, tuple):
+        return _spell_numbers(cast("tuple[float, ...]", setting))
+    return repr(setting) if isinstance(setting, float) else str(setting)
 
 
 def _spell_numbers(numbers: Sequence[float]) -> str:
@@ -137,18 +137,18 @@ def words_of(leaf: Leaf) -> str:
     return key if group == "amplitudes" else lowered(leaf.label)
 
 
-# --- What a browser sends -------------------------------------------------------------------------
+# --- Settings from a browser ----------------------------------------------------------------------
 
 
 def put(state: AppState, path: str, text: str) -> AppState:
-    """Set a leaf to what somebody has typed, clicked or sent; notes say what was not taken."""
+    """Set a leaf from a text of the page; notes report rejected and clamped values."""
     leaf = leaves(state).get(path)
     if leaf is None:
-        return state.noted(f"{path[:SHOWN]!r}: nothing on this page goes by this name")
+        return state.noted(f"{path[:MAX_QUOTED]!r}: unknown setting")
     try:
         state = set_leaf(state, leaf, text)
     except Unreadable as problem:
-        return state.noted(f"{words_of(leaf)} = {text[:SHOWN]!r}; {problem}, it stays as it was")
+        return state.noted(f"{words_of(leaf)} = {text[:MAX_QUOTED]!r}; {problem}; unchanged")
     after = AFTER.get(path) or AFTER.get(path.rpartition(".")[0])
     return state if after is None else after(state)
 
@@ -161,36 +161,38 @@ AFTER: Mapping[str, Callable[[AppState], AppState]] = {
     "look.range_top": lambda s: replace(s, look=replace(s.look, range_mode="fixed")),
     "look.slices_mm": lambda s: replace(s, look=replace(s.look, follow=False)),
 }
-"""What follows where somebody sets a leaf; not where a link or a file does."""
+"""Consequences of setting a leaf on the page; not from a link or a file."""
 
 
 def set_leaf(state: AppState, leaf: Leaf, text: str) -> AppState:
-    """Set a leaf to what a text says and to nothing else; raises `Unreadable`."""
+    """Set one leaf from a text; raises `Unreadable`."""
     text = text[:LONGEST].encode("utf-8", "replace").decode()
-    own = OWN.get(leaf.path) or OWN.get(leaf.path.rpartition(".")[0])
-    if own is not None:
-        return own(state, leaf, text)
-    found, note = read_value(leaf, text, stored(state, leaf.path))
-    return _with(state, leaf.path.split("."), found).noted(note)
+    setter = SETTERS.get(leaf.path) or SETTERS.get(leaf.path.rpartition(".")[0])
+    if setter is not None:
+        return setter(state, leaf, text)
+    setting, note = read_value(leaf, text, stored(state, leaf.path))
+    return _with(state, leaf.path.split("."), setting).noted(note)
 
 
-def _with(thing: Any, names: Sequence[str], found: Any) -> Any:
-    name, *rest = names
-    if isinstance(thing, Mapping):
-        entries = {**cast("Mapping[str, Any]", thing), name: found}
+def _with(branch: Any, names: Sequence[str], setting: Any) -> Any:
+    name, *path = names
+    if isinstance(branch, Mapping):
+        entries = {**cast("Mapping[str, Any]", branch), name: setting}
         return {key: entry for key, entry in entries.items() if entry != ()}
-    return replace(thing, **{name: _with(getattr(thing, name), rest, found) if rest else found})
+    if path:
+        setting = _with(getattr(branch, name), path, setting)
+    return replace(branch, **{name: setting})
 
 
-# --- Leaves that are set in a way of their own ----------------------------------------------------
+# --- Leaves with their own setters ----------------------------------------------------------------
 
 
 def _with_half_width(state: AppState, leaf: Leaf, text: str) -> AppState:
     key = leaf.path.rpartition(".")[2]
     widest = max(MAX_HALF_WIDTH, edits.half_width_span(state, key).high)
-    kept, note = _number(replace(leaf, span=Span(0.0, widest, 0.1)), text)
-    kept = 0.0 if kept < MIN_HALF_WIDTH else kept
-    return edits.with_half_widths(state, {key: kept}).noted(note)
+    half_width, note = _number(replace(leaf, span=Span(0.0, widest, 0.1)), text)
+    half_width = 0.0 if half_width < MIN_HALF_WIDTH else half_width
+    return edits.with_half_widths(state, {key: half_width}).noted(note)
 
 
 def _with_costs(state: AppState, _leaf: Leaf, text: str) -> AppState:
@@ -200,14 +202,14 @@ def _with_costs(state: AppState, _leaf: Leaf, text: str) -> AppState:
         raise Unreadable(str(problem)) from None
     for key, cost in costs.items():
         if key not in state.amplitudes:
-            raise Unreadable(f"{key}: no parameter of this machine")
+            raise Unreadable(f"{key} is not a parameter of this machine")
         if not COST[0] <= cost <= COST[1]:
             raise Unreadable(f"{key}={cost:g}: expected {COST[0]:g} to {COST[1]:g}")
-    found = ",".join(f"{key}={cost:g}" for key, cost in costs.items() if cost != 1.0)
-    return replace(state, specification=replace(state.specification, costs=found))
+    normalised = ",".join(f"{key}={cost:g}" for key, cost in costs.items() if cost != 1.0)
+    return replace(state, specification=replace(state.specification, costs=normalised))
 
 
-FARTHEST_MM = 1e5  # farthest point of a workpiece that a link may ask about
+FARTHEST_MM = 1e5  # of a traced point in a link
 EXAMPLE = "X 275 Y -225 Z -480"
 
 
@@ -215,9 +217,9 @@ def _with_point(state: AppState, _leaf: Leaf, text: str) -> AppState:
     if not text.strip():
         return replace(state, picked=None, lever="")
     typed, spans = read_positions(text), linear_spans(state.scene)
-    known = {*spans, *state.positions}
-    if typed is None or not typed.keys() <= known:
-        expected = f"expected positions of the axes {', '.join(sorted(known, key=axis_order))}"
+    axes = {*spans, *state.positions}
+    if typed is None or not typed.keys() <= axes:
+        expected = f"expected positions of the axes {', '.join(sorted(axes, key=axis_order))}"
         raise Unreadable(f"{expected}, for instance {EXAMPLE}")
     before = {} if state.picked is None else state.picked.at
     stands = {**state.scene.workspace.positions, **before}
@@ -229,8 +231,8 @@ def _with_point(state: AppState, _leaf: Leaf, text: str) -> AppState:
 
 
 def _with_trace(state: AppState, _leaf: Leaf, text: str) -> AppState:
-    loop, _, rest = text.partition(",")
-    point = [read_typed(word) for word in rest.split(",")]
+    loop, _, point_text = text.partition(",")
+    point = [read_typed(word) for word in point_text.split(",")]
     near = [at for at in point if at is not None and abs(at) <= FARTHEST_MM]
     if loop not in [*Loop] or len(point) != 3 or len(near) != 3:
         raise Unreadable("expected a loop and a traced point")
@@ -246,7 +248,7 @@ def _with_asked(state: AppState, leaf: Leaf, text: str) -> AppState:
     return replace(state, picked=replace(picked, at={**picked.at, axis: at})).noted(note)
 
 
-OWN: Mapping[str, Callable[[AppState, Leaf, str], AppState]] = {
+SETTERS: Mapping[str, Callable[[AppState, Leaf, str], AppState]] = {
     "tolerances": _with_half_width,
     "specification.costs": _with_costs,
     "picked": _with_point,
@@ -255,7 +257,7 @@ OWN: Mapping[str, Callable[[AppState, Leaf, str], AppState]] = {
 }
 
 
-# --- One text that somebody typed or sent into the value of a leaf --------------------------------
+# --- Parsing of texts -----------------------------------------------------------------------------
 
 MOST_NAMES = 100
 LONGEST_NAME = 80
@@ -264,20 +266,20 @@ SWITCHES = {"0": False, "1": True}
 
 
 def read_value(leaf: Leaf, text: str, old: Any) -> tuple[Any, str]:
-    """Read a value, and what had to be said about it; raises `Unreadable`."""
+    """Parse a value; return it with a note; raises `Unreadable`."""
     plain = text.strip()
     match leaf.kind:
         case "number" if plain in leaf.choices:
             return None, ""
         case "number":
-            kept, note = _number(leaf, text)
+            number, note = _number(leaf, text)
             if isinstance(old, int) and leaf.span is not None:
                 low, step = leaf.span.low, leaf.span.step
-                return int(low + step * math.floor((kept - low) / step + 0.5)), note
-            return kept, note
+                return int(low + step * math.floor((number - low) / step + 0.5)), note
+            return number, note
         case "numbers" if leaf.span is not None:
-            found, note = read_list(text, leaf.span)
-            return found, f"{leaf.label}: {note}" if note else ""
+            numbers, note = read_list(text, leaf.span)
+            return numbers, f"{leaf.label}: {note}" if note else ""
         case "point":
             return _read_point(leaf, text) if plain else (None, "")
         case "switch":
@@ -286,8 +288,8 @@ def read_value(leaf: Leaf, text: str, old: Any) -> tuple[Any, str]:
             return SWITCHES[plain], ""
         case "choice":
             if text not in leaf.choices:
-                known = ", ".join(filter(None, leaf.choices))
-                raise Unreadable(f"expected one of {known}"[:LONGEST_NOTE])
+                allowed = ", ".join(filter(None, leaf.choices))
+                raise Unreadable(f"expected one of {allowed}"[:LONGEST_NOTE])
             return (type(old)(text) if isinstance(old, StrEnum) else text), ""
         case "keys" | "names":
             return _read_keys(leaf, text, old)
@@ -298,14 +300,14 @@ def read_value(leaf: Leaf, text: str, old: Any) -> tuple[Any, str]:
 
 
 def _number(leaf: Leaf, text: str) -> tuple[float, str]:
-    """Read a number, with or without its unit, and bring it into the range of its leaf."""
-    given = read_typed(text.strip().removeprefix("×"), leaf.unit)
-    if given is None:
+    """Parse a number, with or without its unit, and clamp it to the range of its leaf."""
+    typed = read_typed(text.strip().removeprefix("×"), leaf.unit)
+    if typed is None:
         raise Unreadable("expected a number")
-    kept = given if leaf.span is None else leaf.span.clamp(given, given)
-    if leaf.span is None or kept == given:
-        return kept, ""
-    return kept, leaf.span.clamped_words(given, kept, words_of(leaf), leaf.unit)
+    clamped = typed if leaf.span is None else leaf.span.clamp(typed, typed)
+    if leaf.span is None or clamped == typed:
+        return clamped, ""
+    return clamped, leaf.span.clamped_words(typed, clamped, words_of(leaf), leaf.unit)
 
 
 def _read_point(leaf: Leaf, text: str) -> tuple[Any, str]:
@@ -313,25 +315,26 @@ def _read_point(leaf: Leaf, text: str) -> tuple[Any, str]:
     parts = text.replace(";", " ").split()
     parts = parts if len(parts) in counts else text.split(",")
     if len(parts) not in counts:
-        raise Unreadable(f"expected three numbers{', or six with turns' * (len(counts) > 1)}")
-    found = [_number(leaf, part.strip().rstrip(",")) for part in parts]
-    return tuple(kept for kept, _ in found), "; ".join(filter(None, (note for _, note in found)))
+        raise Unreadable(f"expected three numbers{', or six with rotations' * (len(counts) > 1)}")
+    numbers = [_number(leaf, part.strip().rstrip(",")) for part in parts]
+    notes = filter(None, (note for _, note in numbers))
+    return tuple(number for number, _ in numbers), "; ".join(notes)
 
 
 def _read_keys(leaf: Leaf, text: str, old: frozenset[str]) -> tuple[frozenset[str], str]:
-    """Read a list of words in place of a set, or words with + or - that come to it or leave it."""
-    words = [word.strip()[:LONGEST_NAME] for word in text.split(",") if word.strip()]
+    """Parse a list of names that replaces a set, or names with + or - that change it."""
+    entries = [word.strip()[:LONGEST_NAME] for word in text.split(",") if word.strip()]
     unknown: list[str] = []
-    changes = bool(words) and all(word[0] in "+-" for word in words)
-    found = set(old) if changes else set[str]()
-    for word in words:
+    changes = bool(entries) and all(word[0] in "+-" for word in entries)
+    names = set(old) if changes else set[str]()
+    for word in entries:
         name = word[1:] if changes else word
         if leaf.kind == "keys" and name not in leaf.choices:
             unknown.append(name)
         elif changes and word[0] == "-":
-            found.discard(name)
+            names.discard(name)
         else:
-            found.add(name)
-    kept = frozenset(sorted(found)[:MOST_NAMES] if leaf.kind == "names" else found)
-    note = f"{words_of(leaf)}: {', '.join(unknown[:4])} left out, which mean nothing here"
-    return kept, note if unknown else ""
+            names.add(name)
+    keys = frozenset(sorted(names)[:MOST_NAMES] if leaf.kind == "names" else names)
+    note = f"{words_of(leaf)}: {', '.join(unknown[:4])} ignored (unknown)"
+    return keys, note if unknown else ""

@@ -1,4 +1,4 @@
-"""Numbers as people type and paste them: decimal commas, other signs, tables, points, lists."""
+"""Numbers as typed and pasted: decimal commas, typographic signs, tables, points, lists."""
 
 import math
 import re
@@ -11,8 +11,8 @@ from warpspace.picture.formatting import IN_R
 
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
 _SIGNS = str.maketrans({"−": "-", "–": "-", "\u00a0": " ", "\u202f": " "})
-"""Signs and blanks that programs write in place of the plain ones."""
-_SHOWN = 40  # characters of a line that a message shows
+"""Typographic signs and blanks."""
+_MAX_QUOTED = 40  # characters of a line that a message shows
 
 
 def read_typed(text: str, unit: str = "") -> float | None:
@@ -28,7 +28,7 @@ def read_typed(text: str, unit: str = "") -> float | None:
 
 
 def spell_typed(value: float) -> str:
-    """Spell a number as in its box: all digits that were given, none that are rounding."""
+    """Format a number for its text box, without rounding noise."""
     return f"{value + 0.0:.12g}"
 
 
@@ -37,16 +37,16 @@ def read_rows(text: str) -> tuple[list[tuple[float, ...]], tuple[str, ...]]:
     numbered = [(number, line) for number, line in enumerate(lines, start=1) if line.strip()]
     remarks: tuple[str, ...] = ()
     if len(numbered) > 1 and _is_heading(numbered[0][1]):
-        heading = " ".join(numbered[0][1].split())[:_SHOWN]
-        remarks = (f"Heading left out: “{heading}”.",)
+        heading = " ".join(numbered[0][1].split())[:_MAX_QUOTED]
+        remarks = (f"Heading ignored: “{heading}”.",)
         del numbered[0]
     return [_numbers(number, line) for number, line in numbered], remarks
 
 
 def comma_rows(text: str) -> str | None:
-    """Give a text whose only separators are commas with blanks in their place, else None.
+    """Replace the commas of a text without other separators by tabs; None for other texts.
 
-    Read the other way, ``-275,0`` is one number with a decimal comma.
+    Otherwise ``-275,0`` is read as one number with a decimal comma.
     """
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     if any("," not in line or re.search(r"[\s;|]", line) for line in lines[1:] or lines):
@@ -70,46 +70,48 @@ def _cells(line: str) -> Sequence[str]:
 
 def _numbers(number: int, line: str) -> tuple[float, ...]:
     values = [read_typed(cell) for cell in _cells(line)]
-    found = tuple(value for value in values if value is not None)
-    if len(found) != len(values):
+    numbers = tuple(value for value in values if value is not None)
+    if len(numbers) != len(values):
         raise OptionError(
-            f"row {number}: {line[:_SHOWN]!r} holds what is no number; expected finite numbers"
+            f"row {number}: {line[:_MAX_QUOTED]!r} contains an invalid number; expected finite"
+            " numbers"
         )
-    return found
+    return numbers
 
 
 # --- Positions of axes, and costs of tolerances ---------------------------------------------------
 
 _POINT_NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[-+]?\d+)?"
-# a digit belongs to the name where a number follows apart: C1 30, C1=30, but C30
+# a digit belongs to the name where a separate number follows: C1 30, C1=30, but C30
 _NAME = r"[a-z][0-9](?=\s*[=:]|\s+[-+.,0-9])|[a-z]"
 _PAIR = re.compile(rf"({_NAME})\s*[=:]?\s*({_POINT_NUMBER})\s*(?:mm|°|deg)?", re.IGNORECASE)
 _BETWEEN = re.compile(r"[\s,;·]*")
-MOST_HELD = 8  # positions that one axis can be held at while another one is turned
+MOST_HELD = 8  # positions of one axis while another one rotates
 
 
 def read_positions(text: str) -> dict[str, float] | None:
-    """Read positions of axes in any of the ways in which they are spelt on the page."""
+    """Parse positions of axes in any notation of the page."""
     plain = text[:MOST_TYPED].translate(_SIGNS).partition(IN_R)[0].strip()
     plain = plain.removeprefix("--at").lstrip(" =").removeprefix("axes")
     pairs = _PAIR.findall(plain)
-    found = {name.upper(): float(value.replace(",", ".")) for name, value in pairs}
-    whole = len(found) == len(pairs) and _BETWEEN.fullmatch(_PAIR.sub("", plain))
-    return found if found and whole and all(map(math.isfinite, found.values())) else None
+    positions = {name.upper(): float(value.replace(",", ".")) for name, value in pairs}
+    is_complete = len(positions) == len(pairs) and _BETWEEN.fullmatch(_PAIR.sub("", plain))
+    is_finite = all(map(math.isfinite, positions.values()))
+    return positions if positions and is_complete and is_finite else None
 
 
 def read_list(text: str, span: Span) -> tuple[tuple[float, ...], str]:
-    """Read positions that an axis is held at, in any order; what is none is left out and named."""
+    """Parse positions of a held axis, in any order; return them with a note on ignored texts."""
     wrong: list[str] = []
-    found: set[float] = set()
+    positions: set[float] = set()
     for word in filter(None, re.split(r"[\s,;°]+", text[:MOST_TYPED])):
         at = read_typed(word)
         if at is None or not span.low <= at <= span.high:
             wrong.append(word[:20])
         else:
-            found.add(at)
+            positions.add(at)
     allowed = f"expected numbers from {span.low:g} to {span.high:g}"
-    notes = [f"{', '.join(wrong[:4])} left out; {allowed}"] if wrong else []
-    if len(found) > MOST_HELD:
-        notes.append(f"{len(found)} positions; the first {MOST_HELD} are taken")
-    return tuple(sorted(found)[:MOST_HELD]), "; ".join(notes)
+    notes = [f"{', '.join(wrong[:4])} ignored; {allowed}"] if wrong else []
+    if len(positions) > MOST_HELD:
+        notes.append(f"{len(positions)} positions; only the first {MOST_HELD} are used")
+    return tuple(sorted(positions)[:MOST_HELD]), "; ".join(notes)
