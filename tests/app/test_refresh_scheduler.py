@@ -20,7 +20,7 @@ class _Panel(Panel):
     def __init__(self, refresh: Refresh) -> None:
         self.refresh, self.urgent = refresh, 0  # type: ignore[misc]
 
-    def depends(self, picture: object) -> tuple[object, ...]:
+    def dependencies(self, picture: object) -> tuple[object, ...]:
         return (self.urgent,)
 
 

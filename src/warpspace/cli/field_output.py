@@ -109,7 +109,7 @@ def print_field(
             u95 |= (
                 {}
                 if loaded.limit_um is None
-                else {"probability": uncertainty.keeps(loaded.limit_um)}
+                else {"probability": uncertainty.conformance_probability(loaded.limit_um)}
             )
         _print_json(axes, result, document, u95)
         return

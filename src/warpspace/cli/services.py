@@ -19,11 +19,12 @@ from warpspace.app.documents.legend import (
     marked,
     numbers_words,
     picture_conditions,
+    projected_labels,
     range_conditions,
     state_conditions,
 )
 from warpspace.app.documents.output_services import CancelledError, Services
-from warpspace.app.documents.scene_file import reopened
+from warpspace.app.documents.scene_file import file_notes, reopened
 from warpspace.app.documents.transfers import shown_sides
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.live_model import LiveModel

@@ -182,13 +182,13 @@ def _point(picture: LivePicture) -> Iterator[Label]:
 
 
 def _measured(picture: LivePicture) -> Iterator[Label]:
-    measurement= measure_distance(picture)
+    measurement = measure_distance(picture)
     if measurement is None:
         return
     distance, _, (start, end, *corner) = measurement
-        places = (*[(start + end) / 2.0] * 2, *corner)
-        for text, at in zip(distance.lines(), places, strict=True):
-            yield Label(text, at, "measured")
+    places = (*[(start + end) / 2.0] * 2, *corner)
+    for text, at in zip(distance.lines(), places, strict=True):
+        yield Label(text, at, "measured")
 
 
 def _names(picture: LivePicture) -> Iterator[Label]:

@@ -29,7 +29,7 @@ from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.machine_library import body_notes, load_machine, machine_names
 from warpspace.scene.model import Scene, scene_notes
-from warpspace.scene.scene_writer import over_ranges, scene_to_toml
+from warpspace.scene.scene_writer import extend_to_ranges, scene_to_toml
 from warpspace.scene.starter import starter_scene
 from warpspace.units import MICROMETRE
 
@@ -192,7 +192,7 @@ def _read(scene: Scene, raw: Tables, like: definition.Machine) -> tuple[Scene, t
     read = parse_scene(tomli_w.dumps(_without(raw, gone)), scene.name, "machine")
     curves = of_axes(scene.errors.functions, chain.axes)
     errors = ErrorSet({key: curve.without_axes(gone) for key, curve in curves.items()})
-    errors = over_ranges(errors, read.model, read.workspace)
+    errors = extend_to_ranges(errors, read.model, read.workspace)
     _check_errors(errors)
     same = _frames(like) == _frames(read.machine)
     named = like if same else known_alike(read.machine)

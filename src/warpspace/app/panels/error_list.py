@@ -326,7 +326,7 @@ class ErrorsPanel(Panel):
     def _rank(self, state: AppState, gains: Mapping[str, float]) -> Ranking:
         """Return the present ranking, or a new one if it is out of date."""
         ranking, positions = self._ranking, tuple(state.positions.items())
-        inputs = (Identity(state.origin), tuple(state.amplitudes), state.seen, positions)
+        inputs = (Identity(state.origin), tuple(state.amplitudes), state.view_key, positions)
         if ranking is not None and ranking.inputs == inputs:
             before = ranking.amplitudes
             changed = {key for key, value in state.amplitudes.items() if value != before.get(key)}

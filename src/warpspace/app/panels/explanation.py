@@ -92,7 +92,10 @@ class WorstPanel(Section):
     def _explain(self, picture: LivePicture) -> PointExplanation:
         if self._explanation is None or self._explanation[0] is not picture:
             picked = picture.state.picked or pick_worst(picture)
-            self._explanation = picture, explain_point(picture.drawn_state, picked, picture.exaggeration)
+            self._explanation = (
+                picture,
+                explain_point(picture.drawn_state, picked, picture.exaggeration),
+            )
         return self._explanation[1]
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -162,10 +165,14 @@ def _uncertainty(explanation: PointExplanation, limit_um: float) -> Markup:
     shares = [(key, share) for key, share in shares if share != "0 %"]
     largest = ", ".join(f"{key} {share}" for key, share in shares[:FIRST])
     probability = number(100.0 * float(uncertainty.conformance_probability(limit_um)), 1)
-    text = ( f"|E| ≤ {limit_um:g} µm with a probability of {probability} %." f" U95{length_words(uncertainty)} µm; variance shares: {largest}")
-    others = EMPTY if len(shares) > FIRST:
-        others = tag("details", tag("summary", "All shares") + rows(shares[FIRST:]), class_="ws-details",
-                        data_key="worst.shares")  # fmt: skip
+    text = (
+        f"|E| ≤ {limit_um:g} µm with a probability of {probability} %."
+        f" U95{length_words(uncertainty)} µm; variance shares: {largest}"
+    )
+    others = EMPTY
+    if len(shares) > FIRST:
+        others = tag("details", tag("summary", "All shares") + rows(shares[FIRST:]),
+                     class_="ws-details", data_key="worst.shares")  # fmt: skip
     return tag("p", text, class_="ws-tiny") + others
 
 
@@ -217,7 +224,9 @@ class DistancePanel(AnalysisPanel):
 
     def before_result(self, state: AppState) -> Markup:
         point, drawn = (
-            awaited_form(state), self.context.picture and measure_distance(self.context.picture),)
+            awaited_form(state),
+            self.context.picture and measure_distance(self.context.picture),
+        )
         hint = "Click two points of the map; a third one gives an angle"
         buttons = [button("Pick points", f"{self.name}:pick", kind="main", hint=hint)]
         if point:
