@@ -129,7 +129,11 @@ def field(
         found |= {"unknown": over.errors.unknown} if over and over.errors.unknown else {}
         if nodes is None and over and u95:
             u95["covariance_um2"] = over.covariance_um2
-            u95 |= {} if loaded.limit_um is None else {"probability": over.conformance_probability(loaded.limit_um)}
+            u95 |= (
+                {}
+                if loaded.limit_um is None
+                else {"probability": over.conformance_probability(loaded.limit_um)}
+            )
         _print_json(axes, result, found, u95)
         return
     told = (*direction_words(loaded), *placed_words(view))
