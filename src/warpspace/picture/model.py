@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 from warpspace.analysis.commands.concepts import Concept, expected_um
 from warpspace.analysis.description import to_json
 from warpspace.analysis.statistics import Statistics, volume_statistics
-from warpspace.analysis.uncertainty.propagation import LEAST_PROBABILITY, FieldUncertainty, field_uncertainty
+from warpspace.analysis.uncertainty.propagation import (
+    LEAST_PROBABILITY,
+    FieldUncertainty,
+    field_uncertainty,
+)
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, View, placed_words, second_order_words
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid

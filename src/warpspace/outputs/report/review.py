@@ -15,7 +15,11 @@ from warpspace.analysis.description import Analysis, Result, ignore_progress
 from warpspace.analysis.sampling.cases import LIMIT_OVER, Over, SamplingPlan
 from warpspace.analysis.sampling.distribution import choose_distribution
 from warpspace.analysis.statistics import Statistics, share_below
-from warpspace.analysis.uncertainty.propagation import LEAST_PROBABILITY, FieldUncertainty, volume_uncertainty
+from warpspace.analysis.uncertainty.propagation import (
+    LEAST_PROBABILITY,
+    FieldUncertainty,
+    volume_uncertainty,
+)
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
