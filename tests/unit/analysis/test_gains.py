@@ -9,6 +9,7 @@ import pytest
 import warpspace
 from products import first
 from warpspace import evaluate, load_scene
+from warpspace.analysis.blocks import Table
 from warpspace.analysis.commands.concepts import Concepts, compare_concepts, expected_um
 from warpspace.analysis.commands.contributions import explain
 from warpspace.analysis.commands.gains import Gain, gains_at, gains_max, mark_key_errors

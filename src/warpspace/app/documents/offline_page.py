@@ -21,7 +21,7 @@ import numpy as np
 import viser
 from markupsafe import Markup, escape
 
-from warpspace.analysis.note_tables import note_numbers, stale_remark, spell_numbers, spell_place
+from warpspace.analysis.note_tables import note_numbers, spell_numbers, spell_place, stale_remark
 from warpspace.app.browser.html import EMPTY, join, linked, lowered, number, rows, tag
 from warpspace.app.browser.page import script_source
 from warpspace.app.documents import legend
