@@ -155,7 +155,8 @@ def _uncertainty(found: PointExplanation, limit_um: float) -> Markup:
     named = [(key, f"{number(100.0 * part, 0)} %") for key, part in parts.items()]
     named = [(key, share) for key, share in named if share != "0 %"]
     said = ", ".join(f"{key} {share}" for key, share in named[:FIRST])
-    kept = f"|E| ≤ {limit_um:g} µm with {number(100.0 * float(sure.conformance_probability(limit_um)), 1)} %"
+    probability = float(sure.conformance_probability(limit_um))
+    kept = f"|E| ≤ {limit_um:g} µm with {number(100.0 * probability, 1)} %"
     words = f"{kept}. U95{length_words(sure)} µm, share of its variance: {said}"
     rest = rows(named[FIRST:]) if len(named) > FIRST else EMPTY
     rest = rest and tag("details", tag("summary", "All shares") + rest, class_="ws-details",
