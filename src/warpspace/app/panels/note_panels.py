@@ -8,10 +8,10 @@ from markupsafe import Markup
 
 from warpspace.analysis.note_tables import (
     note_numbers,
-    stale_remark,
     spell_change,
     spell_numbers,
     spell_place,
+    stale_remark,
 )
 from warpspace.app.browser.html import EMPTY, button, fill, join, linked, tag, text_box
 from warpspace.app.browser.incoming import index_of
