@@ -9,9 +9,11 @@ import pytest
 import warpspace
 from products import first
 from warpspace import evaluate, load_scene
+from warpspace.analysis.blocks import Table
 from warpspace.analysis.commands.concepts import Concepts, compare_concepts, expected_um
 from warpspace.analysis.commands.contributions import explain
 from warpspace.analysis.commands.gains import Gain, gains_at, gains_max, mark_key_errors
+from warpspace.analysis.publications import PUBLICATIONS, Publication
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.field.evaluate import View
 from warpspace.field.grid import build_grid
@@ -190,3 +192,26 @@ def test_no_point_is_held_still():
 def test_tolerances_without_width_are_said():
     with pytest.raises(SceneError, match="none of the relative loop has a width"):
         compare_concepts([with_default("wFXYZt", 0.0, 0.0, 0.0)], QUICK)
+
+
+def test_a_publication_has_a_column_of_key_errors():
+    def nothing(*_):
+        return None
+
+    book = Publication(
+        name="book",
+        key_errors=lambda machine: ("EXX",) if machine == "dvf5000" else (),
+        sampled_mean=nothing,
+        measured_error=nothing,
+    )
+    scene = load_scene("dvf5000_first")
+    PUBLICATIONS.register(book)
+    try:
+        (table,) = warpspace.gains(scene).blocks_of(Table)
+    finally:
+        PUBLICATIONS.unregister("book")
+    head, *rows = table.csv_rows()
+    marked = {row[head.index("key")] for row in rows if row[head.index("book_key_error")]}
+    assert marked == {"EXX"}
+    assert "book" in [column.heading for column in table.visible_columns]
+    assert "thesis_key_error" in head

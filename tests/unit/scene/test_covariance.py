@@ -55,9 +55,7 @@ def test_what_is_left_open_is_unknown_also_where_its_value_is_zero():
     assert (doubt.unknown, doubt.is_known) == (("EXX", "EYY"), False)
     assert not replace(doubt, unknown=()).is_known  # as an app does that counts again
     said = " ".join(doubt.remarks())
-    assert (
-        "not estimable from the readings: EXX, EYY; results that depend on them show “± ?”" in said
-    )
+    assert "not estimable from the readings: EXX, EYY; what depends on them shows “± ?”" in said
     assert "61.9 times the scatter of its readings; U95 does not include that" in said
     assert "not stated" not in said
     known = scene_uncertainty(parse_scene(SCENE, "s"))

@@ -8,12 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import (
-    Analysis,
-    ExpandedUncertainty,
-    ProgressCallback,
-    Result,
-)
+from warpspace.analysis.description import Analysis, ExpandedUncertainty, ProgressCallback, Result
 from warpspace.analysis.options import LOOP_HELP, option
 from warpspace.analysis.statistics import share_below, share_within
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus

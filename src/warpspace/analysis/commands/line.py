@@ -6,12 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
-from warpspace.analysis.description import (
-    Analysis,
-    ExpandedUncertainty,
-    ProgressCallback,
-    Result,
-)
+from warpspace.analysis.description import Analysis, ExpandedUncertainty, ProgressCallback, Result
 from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
 from warpspace.analysis.uncertainty.propagation import plus_minus, scene_uncertainty, u95_columns
 from warpspace.exceptions import OptionError

@@ -39,6 +39,7 @@ NUMBERS = {
 JSON_NUMBERS = (
     "mean_um", "mode_um", "median_um", "p95_um", "p99_um", "max_um", "histogram",
 )  # fmt: skip
+INTERVAL = ("probability", "low", "high")
 PRINTED = 200  # rows that are printed
 WHERE = {Over.SAMPLED: "at one random point", Over.MAX: "everywhere", Over.MEAN: "in the mean"}
 WHAT = {
@@ -386,6 +387,13 @@ def sampled_histogram(
     printed: Sequence[tuple[str, float]] = (),
 ) -> Histogram:
     edges, probability = sampled.histogram.edges_um, sampled.probability
+    captions = ()
+    if probability is not None:
+        share, low, high = (100.0 * getattr(probability, name) for name in INTERVAL)
+        limit = f"stay within {probability.spec_um:g} µm"
+        captions = (
+            f"{share:.2f} % of the machines\n{limit}", f"95 % interval {low:.2f} … {high:.2f} %",
+        )  # fmt: skip
     marks = [("mode", sampled.mode_um), ("mean", sampled.mean_um), ("P95", sampled.p95_um)]
     return Histogram(
         title,
@@ -396,13 +404,7 @@ def sampled_histogram(
         100.0 * sampled.histogram.counts / sampled.plan.samples,
         (*marks, *printed),
         sampled.plan.spec_um,
-        ()
-        if probability is None
-        else (
-            f"{100.0 * probability.probability:.2f} % of the machines\n"
-            f"stay within {probability.spec_um:g} µm",
-            f"95 % interval {100.0 * probability.low:.2f} … {100.0 * probability.high:.2f} %",
-        ),
+        captions,
     )
 
 

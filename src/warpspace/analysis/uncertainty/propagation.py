@@ -149,10 +149,10 @@ class ErrorUncertainty:
             )
         if self.undetermined:
             names = ", ".join(self.undetermined)
-            yield f"not estimable from the readings: {names}; results that depend on them show “± ?”"
+            yield f"not estimable from the readings: {names}; what depends on them shows “± ?”"
         if self.lack_of_fit:
             yield (
-                f"lack of fit: the residuals of the calibration are {self.lack_of_fit:.1f} times the"
+                f"lack of fit: residuals of the calibration are {self.lack_of_fit:.1f} times the"
                 " scatter of its readings; U95 does not include that"
             )
 
