@@ -161,8 +161,8 @@ def test_killed_server_is_said_and_its_tab_restored(browser, tmp_path):
         page.wait_for_selector(BOX, timeout=SECONDS * 1000)
     said = page.inner_text(BOX)
     assert "Connection to the server lost" in said
-    assert re.search(r"Kept in this tab: .* as of \d", said)
-    page.wait_for_function(f"/Trying again every second, for ([2-9]|\\d\\d+) s/.test("
+    assert re.search(r"Saved in this tab: .* as of \d", said)
+    page.wait_for_function(f"/Reconnecting, for ([2-9]|\\d\\d+) s/.test("
                            f"document.querySelector('{BOX}').innerText)")  # fmt: skip
     assert page.get_attribute(BOX, "role") == "alert"
     assert maximum(page) == changed  # the last picture stays
@@ -196,7 +196,7 @@ def test_interrupted_connection_says_that_all_is_there_and_a_lost_state_that_it_
         page.evaluate("document.hasFocus = () => false")
         viewer.server._websock_server.disconnect_all_clients()
         page.wait_for_selector(f"{BOX}[role=alert]")
-        tab.until(lambda: "as soon as this page is in front" in page.inner_text(BOX))
+        tab.until(lambda: "as soon as this page is in the foreground" in page.inner_text(BOX))
         page.evaluate(
             "() => { document.hasFocus = () => true; window.dispatchEvent(new Event('focus')); }"
         )

@@ -166,7 +166,7 @@ def test_an_adjustment_is_decided_on_and_taken_back(tab):
     (note,) = tab.state.review
     assert (note.kind, note.change["EA0Z"][0]) == ("decision", start["EA0Z"])
     tab.click("Revert")
-    tab.says("Taken back")
+    tab.says("Reverted")
     tab.says("changed: ", within="#ws-notes .ws-note")
     assert tab.state.amplitudes == start
 

@@ -169,11 +169,11 @@ def _uncertainty(explanation: PointExplanation, limit_um: float) -> Markup:
         f"|E| ≤ {limit_um:g} µm with a probability of {probability} %."
         f" U95{length_words(uncertainty)} µm; variance shares: {largest}"
     )
-    others = EMPTY
+    more_shares = EMPTY
     if len(shares) > FIRST:
-        others = tag("details", tag("summary", "All shares") + rows(shares[FIRST:]),
+        more_shares = tag("details", tag("summary", "All shares") + rows(shares[FIRST:]),
                      class_="ws-details", data_key="worst.shares")  # fmt: skip
-    return tag("p", text, class_="ws-tiny") + others
+    return tag("p", text, class_="ws-tiny") + more_shares
 
 
 def _details(explanation: PointExplanation, lever: str) -> Markup:
