@@ -143,7 +143,8 @@ class TolerancesPanel(AnalysisPanel):
             '<p class="ws-headline"><span class="{kind}">{share} %</span> of the machines stay'
             " within {limit} µm {where}</p>",
             kind="ws-pass" if probability.low >= specification.percent / 100.0 else "ws-fail",
-            share=percent(probability.probability), limit=f"{specification.limit_um:g}", where=WHERE[specification.over],
+            share=percent(probability.probability), limit=f"{specification.limit_um:g}",
+            where=WHERE[specification.over],
         )  # fmt: skip
         numbers = (
             f"mean {number(stream.mean_um)} · P95 {number(stream.quantile(0.95))} ·"

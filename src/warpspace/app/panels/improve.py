@@ -187,7 +187,8 @@ class CompensatePanel(AnalysisPanel):
         _, table, *assumptions = result.blocks()
         drawn = [result_html([table])]
         if _is_rounding(result):
-            drawn.append(tag("p", "The residual error is below the resolution of the file.", class_="ws-pass"))  # fmt: skip
+            text = "The residual error is below the resolution of the file."
+            drawn.append(tag("p", text, class_="ws-pass"))
         if self._picture is not None and self._picture[0] is result:
             drawn.append(tag("img", src=self._picture[1], alt="Maps of |E| before and after",
                              width="100%"))  # fmt: skip
