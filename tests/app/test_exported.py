@@ -130,7 +130,7 @@ def test_the_figure_shows_what_is_coloured_in_the_range_that_is_fixed(renderer):
 
 def test_two_loops_on_one_sheet_are_refused_in_words():
     picture = picture_of("difference", replace(with_pin(START), loop=Loop("relative")))
-    with pytest.raises(OptionError, match="one loop"):
+    with pytest.raises(OptionError, match="same loop"):
         draw_figure(picture, "", threading.Event())
     # the other exports draw each side through its own
     assert rows_of(picture)[0]["loop"] == "relative − tool"

@@ -212,7 +212,9 @@ def test_a_mesh_that_is_read_is_never_replaced(warpspace, tmp_path):
     before = (tmp_path / "mill_Z.stl").read_bytes()
     robot = tmp_path / "mill.urdf"
     robot.write_text(ROBOT.format(mesh="mill_Z.stl"), encoding="utf-8")
-    warpspace("import", robot, "-o", tmp_path / "mill.toml", "--force").refused("is read")
+    warpspace("import", robot, "-o", tmp_path / "mill.toml", "--force").refused(
+        "is an input of its own output"
+    )
     assert (tmp_path / "mill_Z.stl").read_bytes() == before
     assert not (tmp_path / "mill.toml").exists()
 
@@ -224,7 +226,9 @@ def test_an_export_never_replaces_a_mesh_of_its_scene(warpspace, tmp_path):
     assert warpspace("new-machine", "wFXZt", "-o", scene).status == 0
     scene.write_text(f'{scene.read_text(encoding="utf-8")}\n[bodies]\nZ = "mill_Z.stl"\n', "utf-8")
     robot = tmp_path / "mill.urdf"
-    warpspace("export", scene, "-o", robot, "--grid", "3", "--force").refused("is read")
+    warpspace("export", scene, "-o", robot, "--grid", "3", "--force").refused(
+        "is an input of its own output"
+    )
     assert mesh.read_bytes() == before
     assert {file.name for file in tmp_path.iterdir()} == {"own.toml", "mill_Z.stl"}
     assert warpspace("export", scene, "-o", tmp_path / "other.urdf", "--grid", "3").status == 0

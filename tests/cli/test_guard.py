@@ -118,7 +118,7 @@ def test_no_output_is_an_input(name, written, read, link, tmp_path, monkeypatch)
         target.symlink_to(source)
     elif link == "hard":
         os.link(source, target)
-    with pytest.raises(OutputError, match=f"{target.name}: is read for"):
+    with pytest.raises(OutputError, match=f"{target.name}: is an input of its own output"):
         run(name, {read: str(source), written: str(target)})
     assert source.read_text(encoding="utf-8") == "mine"
     assert {path.name for path in tmp_path.iterdir()} == {source.name, target.name}
@@ -184,5 +184,5 @@ def test_tables_beside_a_table_replace_nothing_that_is_read(tmp_path, warpspace)
     scene.rename(beside[0])
     text = beside[0].read_text(encoding="utf-8")
     again = ("compensate", beside[0], "--format", "linuxcnc-comp", "-o", made, "--force")
-    warpspace(*again).refused(f"{beside[0].name}: is read for")
+    warpspace(*again).refused(f"{beside[0].name}: is an input of its own output")
     assert beside[0].read_text(encoding="utf-8") == text

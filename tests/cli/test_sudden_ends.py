@@ -216,7 +216,7 @@ def test_view_ends_at_once_while_a_figure_is_drawn(how, tmp_path):
     assert time.monotonic() - begin < 5.0
     assert all_have_ended(tmp_path)
     assert "Traceback" not in said(tmp_path)
-    assert "ended" in said(tmp_path)
+    assert "stopped" in said(tmp_path)
 
 
 SIGNALLED_THREAD = """
@@ -237,4 +237,4 @@ main()
 def test_view_heeds_a_signal_that_the_system_gives_to_another_thread(tmp_path):
     process = start(tmp_path, "view", "--no-browser", code=SIGNALLED_THREAD)
     assert process.wait(30) in (0, 128 + signal.SIGTERM)
-    assert "ended" in said(tmp_path)
+    assert "stopped" in said(tmp_path)

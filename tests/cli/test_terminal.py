@@ -54,14 +54,23 @@ def test_steering_characters_are_spelt_out():
     ],
     ids=lambda command: " ".join(command[:2]),
 )
-def test_a_title_reaches_the_terminal_harmless(command, tmp_path, warpspace):
+def test_a_description_reaches_the_terminal_harmless(command, tmp_path, warpspace):
     path = tmp_path / "s.toml"
-    title = json.dumps(EVIL)
+    description = json.dumps(EVIL)
     half_widths = "default = { translation = 10, rotation = 20, squareness = 25 }"
-    text = f'title = {title}\nmachine = "dvf5000"\n[errors]\nEC0Y = 5\n[tolerances]\n{half_widths}'
+    head = f'title = "t"\ndescription = {description}\nmachine = "dvf5000"\n'
+    text = f"{head}[errors]\nEC0Y = 5\n[tolerances]\n{half_widths}"
     path.write_text(text, "utf-8")
     result = warpspace(*command[0].split(), path, *command[1:])
     assert result.status == 0, result.err
+    assert not any(character in result.out + result.err for character in STEERING)
+
+
+def test_a_title_with_control_characters_is_refused_harmlessly(tmp_path, warpspace):
+    path = tmp_path / "s.toml"
+    path.write_text(f'title = {json.dumps(EVIL)}\nmachine = "dvf5000"\n', "utf-8")
+    result = warpspace("check", path)
+    assert result.status == 2
     assert not any(character in result.out + result.err for character in STEERING)
 
 

@@ -7,14 +7,14 @@ import pytest
 
 from doc_pages import DOCS, blocks, section
 
-PAGE = section(DOCS / "uncertainty.md", "One budget, from reading to verdict") or ""
+PAGE = section(DOCS / "uncertainty.md", "A complete budget, from reading to verdict") or ""
 COMMANDS = [shlex.split(line)[1:] for line in PAGE.splitlines() if line.startswith("    warpspace")]
 
 
 @pytest.fixture
 def answers(warpspace, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "laser_x.csv").write_text(*blocks(PAGE, "csv"), encoding="utf-8")
+    (tmp_path / "laser_x.csv").write_text(*blocks(PAGE, "text"), encoding="utf-8")
     (tmp_path / "width.toml").write_text(*blocks(PAGE, "toml"), encoding="utf-8")
     calibrate, piece, part = COMMANDS
     found = warpspace(*calibrate, "--json").json

@@ -26,6 +26,7 @@ from warpspace.scene.notes import (
     with_note,
 )
 from warpspace.scene.scene_writer import scene_to_toml
+from warpspace.scene.text_files import one_line
 
 BEGAN = datetime(2026, 11, 22, 10, tzinfo=UTC)
 SCENE = load_scene("dvf5000_first")
@@ -131,12 +132,13 @@ VALUES = st.floats(-1e5, 1e5, allow_subnormal=False) | st.integers(-500, 500)
 CHANGEABLE = st.sampled_from(("EA0Z", "tolerances.EXX"))
 AT = st.dictionaries(st.sampled_from("XYZBC"), VALUES)
 DATES = st.datetimes(min_value=datetime(1970, 1, 1), timezones=st.just(UTC))  # noqa: DTZ001
-REPLIES = st.builds(Reply, text=TEXTS, author=TEXTS, date=DATES)
+AUTHORS = TEXTS.map(one_line)
+REPLIES = st.builds(Reply, text=TEXTS, author=AUTHORS, date=DATES)
 
 
 def notes(**more):
     return st.builds(
-        Note, kind=st.sampled_from(KINDS), at=AT, text=TEXTS, author=TEXTS, date=DATES,
+        Note, kind=st.sampled_from(KINDS), at=AT, text=TEXTS, author=AUTHORS, date=DATES,
         status=st.sampled_from(STATUSES), numbers=MEASURED, before=MEASURED,
         change=st.dictionaries(CHANGEABLE, st.tuples(VALUES, VALUES)),
         step=st.integers(0, MAX_NOTES), view=TEXTS, replaces=st.lists(IDS, max_size=3).map(tuple),

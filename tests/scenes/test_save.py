@@ -20,6 +20,7 @@ from warpspace.machine.errors import (
 from warpspace.machine.limits import MIN_HALF_WIDTH
 from warpspace.scene.library import parse_scene
 from warpspace.scene.scene_writer import scene_to_toml
+from warpspace.scene.text_files import one_line
 
 finite = st.floats(-1e3, 1e3, allow_subnormal=False)
 
@@ -31,7 +32,7 @@ def test_every_bundled_scene_reloads_identically(name):
 
 
 @given(
-    title=st.text(max_size=60),
+    title=st.text(max_size=60).map(one_line),
     value=finite,
     centre=finite,
     half=st.just(0.0) | st.floats(MIN_HALF_WIDTH, 1e3),

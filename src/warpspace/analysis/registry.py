@@ -68,7 +68,7 @@ _BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
     ("convert", "measure", "analysis.commands.convert:Convert",
      "Write the errors of SCENE in another convention."),
     ("calibrate", "measure", "calibration.calibrate:Calibrate",
-     "Find the errors of the machine of SCENE in measured data."),
+     "Fit the errors of the machine of SCENE to measured data."),
     ("part", "measure", "parts.part:Part",
      "Evaluate a part, a mesh, as the machine of SCENE cuts it."),
     ("program", "measure", "parts.program:Program",
