@@ -107,7 +107,9 @@ def test_an_output_says_its_endings_in_its_help_and_can_be_forced(name):
                 assert known in (param.help or "") or known[1:].upper() in (param.help or "")
 
 
-@pytest.mark.parametrize("link", [None, "symbolic", "hard"])
+@pytest.mark.parametrize(
+    "link", [None, *(pytest.param(k, marks=pytest.mark.nightly) for k in ("symbolic", "hard"))]
+)
 @pytest.mark.parametrize(("name", "written", "read"), PAIRS)
 def test_no_output_is_an_input(name, written, read, link, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -196,7 +196,11 @@ main()
     assert done.stderr.strip().endswith(b"ValueError: \\x1b[31m")
 
 
-@pytest.mark.parametrize("closed", [(1,), (2,), (0, 1, 2)], ids=str)
+@pytest.mark.parametrize(
+    "closed",
+    [(1,), *(pytest.param(n, marks=pytest.mark.nightly) for n in ((2,), (0, 1, 2)))],
+    ids=str,
+)
 @pytest.mark.parametrize(
     ("arguments", "status"),
     [
@@ -241,7 +245,10 @@ def test_an_output_without_greek_letters(encoding):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems draw without EGL")
-@pytest.mark.parametrize("arguments", [("draw", "-o", "x.png"), ("report", "-o", "x.html")])
+@pytest.mark.parametrize(
+    "arguments",
+    [("draw", "-o", "x.png"), pytest.param(("report", "-o", "x.html"), marks=pytest.mark.nightly)],
+)
 def test_a_machine_without_egl(arguments, tmp_path):
     command, *output = arguments
     empty = {"__EGL_VENDOR_LIBRARY_DIRS": str(tmp_path / "none")}

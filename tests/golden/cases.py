@@ -96,7 +96,7 @@ CASES: dict[str, str] = {
 }
 DAILY = frozenset(f"{name}-dvf5000_first" for name in _EACH) | {
     "scenes", "thesis-json", "new-machine", "compare-text", "contributions-text", "montecarlo-text",
-    "allocate-text", "concepts-text", "circular-text", "rotary", "klipper", "convert", "report",
+    "allocate-text", "concepts-text", "circular-text", "rotary", "klipper", "convert",
     "field-relative", "adjust-limits", "calibrate", "bad-option",
 }  # fmt: skip
 """What `make test` runs of them."""

@@ -14,7 +14,6 @@ import tomli_w
 
 from golden.running import run_refused
 from offline import EVIL, opened_offline, wait_for_the_map
-from products import first
 from warpspace import evaluate, load_scene
 from warpspace.analysis.blocks import Column, number_columns
 from warpspace.analysis.commands.concepts import Concepts, compare_concepts
@@ -237,7 +236,8 @@ def test_pdf_repeats_and_says_everything(renderer, tmp_path, monkeypatch):
 
 
 @pytest.mark.render
-@pytest.mark.parametrize("loop", first("workpiece", "relative"))
+@pytest.mark.nightly
+@pytest.mark.parametrize("loop", ["workpiece", "relative"])
 def test_other_loops_and_scenes_without_tolerances(loop, renderer, tmp_path):
     path = tmp_path / "bare.toml"
     path.write_text('title = "bare"\nmachine = "dvf5000"\n[errors]\nEXC = 4.0\n')

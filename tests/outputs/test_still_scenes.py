@@ -102,7 +102,7 @@ def test_the_surface_in_pyvista_is_a_line_or_a_vertex(name, cells):
 @pytest.mark.parametrize(
     ("name", "ending"),
     [
-        ("nothing moves", "html"),
+        pytest.param("nothing moves", "html", marks=pytest.mark.nightly),
         pytest.param("wFXt", "html", marks=pytest.mark.nightly),
         pytest.param("wCFt, traces", "pdf", marks=pytest.mark.nightly),
     ],

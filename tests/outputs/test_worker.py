@@ -43,6 +43,7 @@ def test_messages_come_through():
         assert worker.begin("error-map", [scene], SMALL)().startswith(b"\x89PNG")
 
 
+@pytest.mark.nightly
 def test_concurrent_requests_queue():
     scene = load_scene("dvf5000_first")
     found: list[bytes] = []

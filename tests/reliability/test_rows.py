@@ -116,6 +116,7 @@ def test_the_worst_line_of_a_parser_takes_time_in_proportion_to_its_length(each,
     assert found <= lines.STEEPEST
 
 
+@pytest.mark.nightly
 def test_many_blank_lines_are_passed_over_in_proportion_to_their_number(tmp_path):
     for each in EVERY:
         seed = each.seeds()[-1]

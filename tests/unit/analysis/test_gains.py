@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import warpspace
-from products import first
 from warpspace import evaluate, load_scene
 from warpspace.analysis.blocks import Table
 from warpspace.analysis.commands.concepts import Concepts, compare_concepts, expected_um
@@ -51,7 +50,8 @@ def test_workpiece_parameters_have_no_parts_in_the_relative_loop():
     assert {row.key: bool(row.lever_parts_mm) for row in found} == {"EAC": False, "EAX": True}
 
 
-@pytest.mark.parametrize("loop", first(Loop.RELATIVE, Loop.TOOL, Loop.WORKPIECE))
+@pytest.mark.nightly
+@pytest.mark.parametrize("loop", [Loop.RELATIVE, Loop.TOOL, Loop.WORKPIECE])
 def test_largest_gain_is_not_below_any_random_position(loop):
     ranges = {name: axis.travel for name, axis in SCENE.machine.axes.items()}
     rng = np.random.default_rng(4)
