@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 import pytest
 
+from products import first
 from warpspace.cli.file_arguments import NUMBERS, DataFile, InputFile, OutputFile, SceneName
 from warpspace.cli.main import cli
 from warpspace.exceptions import OutputError
@@ -107,9 +108,7 @@ def test_an_output_says_its_endings_in_its_help_and_can_be_forced(name):
                 assert known in (param.help or "") or known[1:].upper() in (param.help or "")
 
 
-@pytest.mark.parametrize(
-    "link", [None, *(pytest.param(k, marks=pytest.mark.nightly) for k in ("symbolic", "hard"))]
-)
+@pytest.mark.parametrize("link", first(None, "symbolic", "hard"))
 @pytest.mark.parametrize(("name", "written", "read"), PAIRS)
 def test_no_output_is_an_input(name, written, read, link, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
