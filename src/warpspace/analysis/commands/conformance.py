@@ -20,16 +20,16 @@ from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.model import Scene, choose_view, evaluate_grid
 from warpspace.units import Array
 
-SHARES = (0.25, 0.5, 0.75, 1.0)  # parts of the volume whose limit the table says
+SHARES = (0.25, 0.5, 0.75, 1.0)  # of the volume, whose limits are reported
 
 
 @dataclass(frozen=True, kw_only=True)
 class Conformance(Analysis):
     """Compute the share of the volume of SCENE within a limit.
 
-    The volume is cut into boxes between the nodes of a grid; a box keeps the limit if all its
-    corners do. Said are the share of the volume, the largest box of axis ranges that keeps it
-    everywhere, and the limits that parts of the volume keep.
+    A box between nodes of the grid is within the limit if all its corners are. The result contains
+    the share of the volume, the largest box of axis ranges within the limit, and the limits for
+    given shares of the volume.
     """
 
     name = "conformance"
@@ -111,7 +111,7 @@ class ConformanceResult(Result):
         share = f"{self.percent:.1f}{about} %"
         yield f"{self.title} · {share} of the volume within {self.limit_um:g} µm"
         if self.box is None:
-            yield "  no box between nodes of the grid keeps the limit"
+            yield "  no box between nodes of the grid is within the limit"
         else:
             columns = (
                 Column("axis", leads=True, key="axis"),
@@ -124,8 +124,8 @@ class ConformanceResult(Result):
                  "mm" if is_linear(axis) else "°")
                 for axis, (low, high) in self.box.items()
             ]  # fmt: skip
-            yield Table(columns, rows, title="Largest box that keeps it everywhere:")
-        columns = (Column("of the volume", leads=True), Column("keeps", ".2f", "µm"))
+            yield Table(columns, rows, title="Largest box within the limit:")
+        columns = (Column("share", leads=True), Column("limit", ".2f", "µm"))
         rows = [*self.keeps_um.items()]
         if self.expanded_uncertainty:
             columns += (Column("U95", unit="µm"),)
@@ -133,7 +133,7 @@ class ConformanceResult(Result):
                 (*row, plus_minus(self.expanded_uncertainty["u95_keeps_um"][row[0]]))
                 for row in rows
             ]
-        yield Table(columns, rows, title="Limits kept by parts of the volume:")
+        yield Table(columns, rows, title="Limit for a share of the volume:")
 
 
 def largest_box(
