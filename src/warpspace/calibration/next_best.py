@@ -23,6 +23,14 @@ from warpspace.kinematics.model import complete_coordinates
 from warpspace.machine.axes import default_keys, is_linear, parameter
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.limits import MAX_SCENE_BYTES
+from warpspace.parts.inspection import measure_changes
+from warpspace.parts.workpiece import (
+    evaluate_points,
+    load_workpiece,
+    place_workpiece,
+    point_basis,
+    subtract_best_fit,
+)
 from warpspace.scene.model import Scene, grid_basis
 from warpspace.scene.text_files import read_text
 from warpspace.units import UM_PER_MM, Array
@@ -316,15 +324,6 @@ def u95_at(
 def _u95_of_part(
     scene: Scene, parameters: solve.FitParameters, target: str
 ) -> Callable[[Array], float]:
-    from warpspace.parts.inspection import measure_changes
-    from warpspace.parts.workpiece import (
-        evaluate_points,
-        load_workpiece,
-        place_workpiece,
-        point_basis,
-        subtract_best_fit,
-    )
-
     file = scene.part.path("file")
     if file is None:
         raise OptionError(f"{{target}} {target}: expected a scene whose [part] has a file")
