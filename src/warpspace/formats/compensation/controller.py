@@ -13,7 +13,6 @@ from warpspace.formats.compensation.corrections import Corrector, MovedPoints, R
 from warpspace.formats.registry import Files, Format, Reading, ReadOptions
 from warpspace.formats.source import source_of_text
 from warpspace.formats.terms import Tables
-from warpspace.formats.to_scene import build_imported_scene
 from warpspace.kinematics.model import Coordinates, Loop
 from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection
 from warpspace.machine.errors import ErrorSet
@@ -148,6 +147,8 @@ def _reference(scene: Scene, coordinates: Coordinates) -> dict[str, Array] | Non
 def read_back(
     kind: Format, files: Files, corrections: RequiredCorrections, label: str
 ) -> Controller:
+    from warpspace.formats.to_scene import build_imported_scene
+
     scene, corrector = corrections.scene, corrections.corrector
     sources = [
         source_of_text(text, f"{corrections.stem}{add}{'' if add else kind.endings[0]}")
