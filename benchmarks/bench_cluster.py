@@ -26,7 +26,9 @@ def case(scene: warpspace.Scene, statistic: str, samples: int) -> Case:
     """Build a case of the tool loop."""
     view = scene.view()
     draws = scene_draws(scene, view.loop, "uniform", clip=False)
-    return Case(scene.model, draws, scene.workspace, view, SamplingPlan(samples, over=statistic))
+    return Case(
+        scene.model, draws, scene.workspace, view, SamplingPlan(samples, reduction=statistic)
+    )
 
 
 def main() -> None:

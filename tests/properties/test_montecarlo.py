@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from warpspace.analysis.loop_parameters import loop_keys
-from warpspace.analysis.sampling.cases import Case, Over, SamplingPlan, reduce_nodes
+from warpspace.analysis.sampling.cases import Case, Reduction, SamplingPlan, reduce_nodes
 from warpspace.analysis.sampling.distribution import Distribution, Stream, build_draws
 from warpspace.analysis.sampling.machine_sampling import montecarlo
 from warpspace.field.evaluate import View
@@ -32,12 +32,12 @@ def run(chain, loop, scale, **plan):
 @given(
     st.sampled_from(CHAINS),
     st.sampled_from([Loop.TOOL, Loop.RELATIVE]),
-    st.sampled_from(list(Over)),
+    st.sampled_from(list(Reduction)),
     st.integers(0, 2**32),
     st.floats(0.1, 10.0),
 )
 def test_errors_scale_with_the_tolerance_and_quantiles_are_in_order(chain, loop, over, seed, scale):
-    plan = {"samples": 300, "seed": seed, "over": over, "nodes": 3, "spec_um": 20.0 * scale}
+    plan = {"samples": 300, "seed": seed, "reduction": over, "nodes": 3, "spec_um": 20.0 * scale}
     one, scaled = run(chain, loop, 1.0, **plan), run(chain, loop, scale, **plan)
     np.testing.assert_allclose(scaled.mean_um, scale * one.mean_um, rtol=1e-9)
     assert one.median_um <= one.p95_um <= one.p99_um <= one.max_um

@@ -62,7 +62,9 @@ def test_every_mode_has_the_mean_square_of_the_trace_at_a_single_point(over, dis
     point = scene.workspace.moved({"X": 50.0, "Y": -100.0, "Z": -300.0})
     keys = loop_keys(scene.model, Loop.TOOL, scene.parameter_keys)
     draws = build_draws(scene.tolerances, keys, distribution, clip=clip)
-    case = Case(scene.model, draws, point, plan=SamplingPlan(samples=200_000, over=over, seed=2))
+    case = Case(
+        scene.model, draws, point, plan=SamplingPlan(samples=200_000, reduction=over, seed=2)
+    )
     result = montecarlo(case)
     variance, offset = expected_square(case)
     assert result.rms_um == pytest.approx(math.sqrt(variance.sum() + offset), rel=0.005)
@@ -72,12 +74,12 @@ def test_max_over_the_corners_is_the_max_over_the_grid():
     scene = warpspace.load_scene("dvf5000_general")
     keys = loop_keys(scene.model, Loop.TOOL, scene.parameter_keys)
     draws = build_draws(scene.tolerances, keys, "uniform")
-    from warpspace.analysis.sampling.cases import Case, Over, reduce_nodes
+    from warpspace.analysis.sampling.cases import Case, Reduction, reduce_nodes
 
     case = Case(scene.model, draws, scene.workspace)
     machines = draws.draw(np.random.default_rng(0), 500)
     found = [
-        reduce_nodes(machines, case.responses(find(7)), Over.MAX)
+        reduce_nodes(machines, case.responses(find(7)), Reduction.MAX)
         for find in (case.site.extreme, case.site.spread)
     ]
     np.testing.assert_allclose(found[0], found[1], rtol=1e-12)

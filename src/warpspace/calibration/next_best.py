@@ -316,30 +316,25 @@ def u95_at(
 def _u95_of_part(
     scene: Scene, parameters: solve.FitParameters, target: str
 ) -> Callable[[Array], float]:
-    from warpspace.parts.inspection import measure_changes
-    from warpspace.parts.workpiece import (
-        evaluate_points,
-        load_workpiece,
-        place_workpiece,
-        point_basis,
-        subtract_best_fit,
-    )
+    from warpspace.parts import inspection, workpiece
 
     file = scene.part.path("file")
     if file is None:
         raise OptionError(f"{{target}} {target}: expected a scene whose [part] has a file")
-    mesh = load_workpiece(file, scene.part.unit or None)
-    points = evaluate_points(scene, place_workpiece(mesh, scene).vertices_mm)
-    gains = point_basis(replace(scene, errors=parameters.errors), points, parameters.keys).position
+    mesh = workpiece.load_workpiece(file, scene.part.unit or None)
+    points = workpiece.evaluate_points(scene, workpiece.place_workpiece(mesh, scene).vertices_mm)
+    gains = workpiece.point_basis(
+        replace(scene, errors=parameters.errors), points, parameters.keys
+    ).position
     features, count = scene.part.path("features"), len(points.point_mm)
     if target == "part":
-        gains = subtract_best_fit(points.point_mm, gains).reshape(
+        gains = workpiece.subtract_best_fit(points.point_mm, gains).reshape(
             len(parameters.keys), -1
         ) / np.sqrt(count)
         return lambda covariance: FACTOR * float(np.sqrt(np.sum(gains * (covariance @ gains))))
     if features is not None:
         tolerances = features, read_text(Path(features), MAX_SCENE_BYTES)
-        gains = measure_changes(mesh, points, gains, tolerances)
+        gains = inspection.measure_changes(mesh, points, gains, tolerances)
     if features is None or not gains.size:
         raise OptionError("{target} verdict: expected a scene whose [part] has tolerances")
 

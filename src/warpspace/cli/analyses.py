@@ -19,11 +19,13 @@ from warpspace.cli.shared_options import (
     plot_option,
     print_json,
     scene_argument,
+    warn_second_order,
     write_texts,
 )
-from warpspace.cli.tables import echo, progress, warn
+from warpspace.cli.tables import echo, print_table, print_text, progress, warn
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import SWEEP_CASES
+from warpspace.scene.text_files import spell_row
 
 if TYPE_CHECKING:
     from warpspace.analysis.blocks import Block
@@ -92,8 +94,6 @@ def _runner(kind: "type[Analysis]", run_analysis: Callable[..., Any] | None) -> 
         force: bool = False,
         **values: Any,
     ) -> None:
-        from warpspace.field.evaluate import second_order_words
-
         option_names = {one.name for one in options_of(kind)}
         names, loaded = load_scenes(scenes or (scene,), kind.scenes)
         analysis = read_options(kind, values, loaded[0])
@@ -112,7 +112,7 @@ def _runner(kind: "type[Analysis]", run_analysis: Callable[..., Any] | None) -> 
                 )
         warn(*result.caveats())
         if result.second_order:
-            warn(*second_order_words(result.second_order))
+            warn_second_order(result.second_order)
         chart, file = plot if kind.has_chart else None, None if run_analysis else output
         written_files = write_result(result, csv_path, chart, file, force=force)
         if as_json:
@@ -148,7 +148,6 @@ def read_options(kind: "type[Analysis]", values: dict[str, Any], scene: "Scene")
 def print_blocks(blocks: "Iterable[Block]") -> None:
     """Print sentences and tables; charts are for pages and files."""
     from warpspace.analysis.blocks import Table
-    from warpspace.cli.tables import print_table, print_text
 
     for block in blocks:
         if isinstance(block, str):
@@ -166,8 +165,6 @@ def write_result(
     result: "Result", csv_path: str | None, plot: str | None, output: str | None, *, force: bool
 ) -> list[str]:
     """Write all files of a result, or none; return those of -o, the file named first."""
-    from warpspace.scene.text_files import spell_row
-
     files: dict[str | Path, str | bytes] = {}
     written_files: list[str] = []
     if output is not None:
@@ -210,12 +207,10 @@ class Fleet(Sequence["Scene"]):
     Each is loaded once at the start, so that an invalid scene is reported immediately.
     """
 
-    def __init__(self, names: Sequence[str]) -> None:
-        from warpspace.scene.library import load_scene
-
-        self._names, self._load = names, load_scene
+    def __init__(self, names: Sequence[str], load: "Callable[[str], Scene]") -> None:
+        self._names, self._load = names, load
         for name in names:
-            load_scene(name)
+            load(name)
 
     def __len__(self) -> int:
         return len(self._names)
@@ -237,7 +232,9 @@ def load_scenes(
             f"at most {maximum or SWEEP_CASES:,}" if len(names) > minimum else f"at least {minimum}"
         )
         raise OptionError(f"{len(names):,} scenes; expected {bound}")
-    return names, [load_scene(name) for name in names] if len(names) <= MAX_LOADED else Fleet(names)
+    if len(names) > MAX_LOADED:
+        return names, Fleet(names, load_scene)
+    return names, [load_scene(name) for name in names]
 
 
 def find_scenes(names: Sequence[str]) -> list[str]:

@@ -11,8 +11,9 @@ import click
 from click.shell_completion import CompletionItem
 
 from warpspace.exceptions import OptionError, OutputError, SceneError
+from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.resources import assets_dir, check_address_space
-from warpspace.scene.text_files import parse_number
+from warpspace.scene.text_files import parse_number, parse_toml, read_text
 
 LEAST_MB = 800  # address space below which imported libraries abort
 NUMBERS = (click.types.IntParamType, click.types.FloatParamType)
@@ -52,10 +53,8 @@ class SceneName(click.ParamType[str]):
 
     def files(self, value: str | Path) -> Iterable[Path]:
         """Find the files of a scene, or of those in a folder: machine, CSV files and meshes."""
-        from warpspace.machine.limits import MAX_SCENE_BYTES
         from warpspace.scene.library import scene_path
         from warpspace.scene.machine_library import machine_names
-        from warpspace.scene.text_files import parse_toml, read_text
 
         machine: object = str(value)
         with suppress(OSError, SceneError):

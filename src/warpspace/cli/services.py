@@ -213,11 +213,10 @@ def write_report(
     cancelled: threading.Event,
 ) -> tuple[bytes, tuple[str, ...]]:
     """Write a report; return the file and the missing figures."""
-    from warpspace.outputs.report import ReportSettings
-    from warpspace.outputs.report import write_report as write_review
+    from warpspace.outputs import report
 
     state, sides = picture.state, shown_sides(picture, sheet=True)
-    settings = ReportSettings(
+    settings = report.ReportSettings(
         loop=sides[0].loop, grid=state.nodes, exaggeration=picture.exaggeration,
         spec_um=state.specification.limit_um, author=author, questions=tuple(questions),
     )  # fmt: skip
@@ -225,7 +224,7 @@ def write_report(
     scenes = [replace(one.active_scene(), review=file_notes(one)) for one in same_loop]
     with _renderer_slot(cancelled), temporary_folder() as folder:
         target = folder / f"report{ending}"
-        review = write_review(
+        review = report.write_report(
             scenes, target, settings, embed=embed_view, story_steps=build_story, results=results
         )
         return target.read_bytes(), review.missing

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 from click.core import ParameterSource
 
+from warpspace.analysis.options import outside_travel, read_place
 from warpspace.cli.file_arguments import OutputFile, SceneName
 from warpspace.cli.tables import escape_json, progress, warn
 from warpspace.exceptions import OptionError
+from warpspace.resources import check_address_space
 from warpspace.scene.text_files import parse_number, parse_whole
 
 if TYPE_CHECKING:
@@ -140,8 +142,6 @@ def grid_option(default: int | None = 21, of: str = "of the working volume") -> 
 
 
 def parse_point(text: str, axes: Collection[str]) -> dict[str, float]:
-    from warpspace.analysis.options import read_place
-
     try:
         return read_place(text, axes)
     except ValueError as error:
@@ -149,8 +149,6 @@ def parse_point(text: str, axes: Collection[str]) -> dict[str, float]:
 
 
 def warn_outside_travel(machine: "Machine", point: Mapping[str, float]) -> None:
-    from warpspace.analysis.options import outside_travel
-
     warn(*(f"--at {words}" for words in outside_travel(machine, point)))
 
 
@@ -311,7 +309,6 @@ def draw_figure_file(
 ) -> None:
     from warpspace.outputs.figure_files import write_figure
     from warpspace.outputs.processes import LEAST_MB
-    from warpspace.resources import check_address_space
 
     check_address_space(LEAST_MB, "drawing")
     with progress("drawing", silent=silent):

@@ -8,7 +8,9 @@ second shows its progress on stderr, unless that is no terminal or the output is
 
 import io
 import re
+import shutil
 import sys
+import textwrap
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from threading import Timer
@@ -30,14 +32,10 @@ _UNBROKEN_SPACES = re.compile(r"(?<=\d) (?=[µm°%])|(?<= [A-Z]) (?=[-+\d])")
 
 
 def output_width() -> int:
-    import shutil
-
     return shutil.get_terminal_size((WIDTH_ELSEWHERE, 24)).columns
 
 
 def print_text(text: str) -> None:
-    import textwrap
-
     text = plain(text)
     indent = text[: len(text) - len(text.lstrip(" "))]
     lines = textwrap.wrap(
@@ -52,8 +50,6 @@ def print_text(text: str) -> None:
 
 
 def print_table(columns: "Sequence[Column]", rows: Sequence[Row], indent: int = 2) -> None:
-    from textwrap import indent as indented
-
     room = output_width() - indent
     rows = [[plain(cell) for cell in row] for row in rows]
     sizes = [_measure(column, [row[i] for row in rows]) for i, column in enumerate(columns)]
@@ -68,7 +64,7 @@ def print_table(columns: "Sequence[Column]", rows: Sequence[Row], indent: int = 
         gap = 2 if sum(sizes[index].natural for index in part) + 2 * gaps <= room else 1
         width = max(room, sum(sizes[index].least for index in part) + gap * gaps)
         drawn = _draw([columns[index] for index in part], cells, gap, width)
-        click.echo(indented(drawn, " " * indent))
+        click.echo(textwrap.indent(drawn, " " * indent))
 
 
 class _Size(NamedTuple):

@@ -1,5 +1,6 @@
 """Numbers printed in the thesis, and the machines and scenes they belong to."""
 
+import tomllib
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,8 +17,6 @@ MEASURED_MACHINES = ("first", "second")
 @cache
 def printed_tables() -> dict[str, Any]:
     """Read the printed numbers, and the notes on them."""
-    import tomllib  # every command imports this module, few need the numbers
-
     return tomllib.loads(Path(__file__).with_name("thesis.toml").read_text("utf-8"))
 
 

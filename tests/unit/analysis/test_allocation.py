@@ -9,7 +9,7 @@ from scipy import special, stats
 
 import warpspace
 from warpspace.analysis.commands.allocate import Allocate, allocate
-from warpspace.analysis.sampling.cases import Case, Over, SamplingPlan
+from warpspace.analysis.sampling.cases import Case, Reduction, SamplingPlan
 from warpspace.analysis.sampling.distribution import Distribution, build_draws, machines_needed
 from warpspace.analysis.sampling.machine_sampling import montecarlo
 from warpspace.analysis.sampling.tolerance_search import build_ensemble
@@ -106,7 +106,7 @@ def test_the_lower_end_of_the_interval_is_the_promise():
     kept = 0
     for seed in range(40):
         found, result = widths(
-            draws_of(EXX=3.0), plan=SamplingPlan(1000, seed, Over.MAX), probability=0.9
+            draws_of(EXX=3.0), plan=SamplingPlan(1000, seed, Reduction.MAX), probability=0.9
         )
         assert 0.9 <= result.after.low < 0.91
         kept += 40.0 / found["EXX"] >= 0.9
@@ -155,7 +155,7 @@ def test_where_the_variance_decides_widths_go_with_the_cube_root_of_cost_by_squa
     assert result.cost_after == pytest.approx(best, rel=0.01)
 
 
-@pytest.mark.parametrize("over", [Over.SAMPLED, Over.MAX])
+@pytest.mark.parametrize("over", [Reduction.SAMPLED, Reduction.MAX])
 @pytest.mark.parametrize("loop", [Loop.TOOL, Loop.RELATIVE])
 def test_the_measured_machine_keeps_the_limit_on_machines_of_its_own(loop, over):
     scene = load_scene("dvf5000_proposed")
@@ -174,7 +174,7 @@ def test_no_other_proportions_are_cheaper():
     scene = load_scene("dvf5000_first")
     found = warpspace.allocate(scene, limit_um=40.0, over="max", samples=50_000, seed=1)
     draws, view = found.draws, View()
-    plan = SamplingPlan(20_000, 77, Over.MAX)
+    plan = SamplingPlan(20_000, 77, Reduction.MAX)
     judge = build_ensemble(Case(scene.model, draws, scene.workspace, view, plan))
     free, rng = found.free, np.random.default_rng(5)
 

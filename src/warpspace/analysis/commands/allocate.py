@@ -12,7 +12,7 @@ from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import Change, ProgressCallback, Result, count_progress
 from warpspace.analysis.options import Grammar, option, read_keys, read_numbers
 from warpspace.analysis.sampling import tolerance_search
-from warpspace.analysis.sampling.cases import Case, Over, both_orders
+from warpspace.analysis.sampling.cases import Case, Reduction, both_orders
 from warpspace.analysis.sampling.distribution import Draws, Probability, machines_needed
 from warpspace.analysis.sampling.machine_sampling import montecarlo, sample_chunks
 from warpspace.analysis.sampling.sampling_options import KeptLimit
@@ -230,9 +230,9 @@ def allocate(
     analysis.check_keys(case.model.machine.allowed_keys)
     draws, plan = case.draws, replace(case.plan, spec_um=analysis.limit_um)
     plan.check()
-    if plan.over == Over.MEAN:
+    if plan.reduction == Reduction.MEAN:
         raise OptionError("{over} mean: expected sampled or max")
-    if plan.over == Over.MAX:
+    if plan.reduction == Reduction.MAX:
         tolerance_search.refuse_many_points(case.view.loop)
     needed = machines_needed(plan.samples, analysis.probability)
     if needed > plan.samples:
@@ -338,7 +338,7 @@ def _new_scales(
     case: Case, limit_um: float, share: float, report: Progress
 ) -> tolerance_search.ScaleOf:
     draws, common = case.draws, None
-    if case.plan.over == Over.MAX:
+    if case.plan.reduction == Reduction.MAX:
         common = case.responses(case.common_places())
 
     def scale(half_width: Array, moving: NDArray[np.bool_]) -> float | None:

@@ -17,7 +17,7 @@ from warpspace.analysis.blocks import (
 )
 from warpspace.analysis.description import ProgressCallback, Result
 from warpspace.analysis.options import error_words, option
-from warpspace.analysis.sampling.cases import Case, Over, SamplingPlan, reduce_nodes
+from warpspace.analysis.sampling.cases import Case, Reduction, SamplingPlan, reduce_nodes
 from warpspace.analysis.sampling.sampling_options import Sampled
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, amplitudes_of, build_basis, error_values, evaluate_exact
@@ -126,10 +126,10 @@ def _sobol(case: Case, base: int) -> Mapping[str, tuple[float, float, float]]:
     unit = np.repeat(unit, len(drawn), axis=0)
     unit[:, wide] = drawn
     places = replace(
-        case, plan=replace(case.plan, over=Over.MEAN, nodes=SOBOL_NODES)
+        case, plan=replace(case.plan, reduction=Reduction.MEAN, nodes=SOBOL_NODES)
     ).common_places()
     gains = case.responses(places)
-    result = reduce_nodes(draws.from_unit(unit), gains, Over.MEAN, places.weights)
+    result = reduce_nodes(draws.from_unit(unit), gains, Reduction.MEAN, places.weights)
     indices = analysis.analyze(problem, result, calc_second_order=False, seed=seed)
     columns = zip(indices["S1"], indices["ST"], indices["ST_conf"], strict=True)
     return {

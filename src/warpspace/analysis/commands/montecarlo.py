@@ -17,7 +17,7 @@ from warpspace.analysis.commands.contributions import expected_square
 from warpspace.analysis.description import ProgressCallback, Result, count_progress, to_json
 from warpspace.analysis.options import Grammar, option
 from warpspace.analysis.publications import PUBLICATIONS, PrintedNumber
-from warpspace.analysis.sampling.cases import DEFAULT_NODES, Case, Over, both_orders
+from warpspace.analysis.sampling.cases import DEFAULT_NODES, Case, Reduction, both_orders
 from warpspace.analysis.sampling.machine_sampling import (
     Progress,
     SampleStatistics,
@@ -41,11 +41,15 @@ JSON_NUMBERS = (
 )  # fmt: skip
 INTERVAL = ("probability", "low", "high")
 PRINTED = 200  # rows that are printed
-WHERE = {Over.SAMPLED: "at one random point", Over.MAX: "everywhere", Over.MEAN: "in the mean"}
+WHERE = {
+    Reduction.SAMPLED: "at one random point",
+    Reduction.MAX: "everywhere",
+    Reduction.MEAN: "in the mean",
+}
 WHAT = {
-    Over.SAMPLED: "|E| at one random point each",
-    Over.MAX: "largest |E| of each",
-    Over.MEAN: "mean |E| of each",
+    Reduction.SAMPLED: "|E| at one random point each",
+    Reduction.MAX: "largest |E| of each",
+    Reduction.MEAN: "mean |E| of each",
 }
 
 
@@ -122,8 +126,8 @@ class MonteCarlo(SampledMachines):
     doing = "sampling"
     has_chart = True
     chart_help = "histogram"
-    over: Over = option(
-        Over.SAMPLED,
+    over: Reduction = option(
+        Reduction.SAMPLED,
         "|E| at one random point per machine, or its largest or mean over a machine's points",
     )
     grid: int = option(DEFAULT_NODES, "Nodes per axis for --over max|mean", low=2, high=101)
@@ -325,7 +329,7 @@ class MonteCarloResult(Result):
             f" P99 {sampled.p99_um:.2f}, max {sampled.max_um:.2f} µm"
         )
         printed: dict[str, PrintedNumber] = {}
-        if analysis.over is Over.SAMPLED:
+        if analysis.over is Reduction.SAMPLED:
             for publication in PUBLICATIONS.members():
                 number = publication.sampled_mean(scene, analysis.loop)
                 if number is not None:
@@ -373,7 +377,7 @@ def _numbers(sampled: SampleStatistics) -> dict[str, Any]:
             "seed": plan.seed,
             "distribution": sampled.draws.distribution,
             "loop": sampled.view.loop,
-            "over": plan.over,
+            "over": plan.reduction,
             **{name: getattr(sampled, name) for name in JSON_NUMBERS},
             **probability,
         }

@@ -211,7 +211,7 @@ Job = Callable[[np.random.Generator, int], Array]
 """Takes a random generator and a number of machines, gives their |E|, [n], µm."""
 
 
-class Over(StrEnum):
+class Reduction(StrEnum):
     """Reduction of |E| to one number per machine."""
 
     SAMPLED = "sampled"
@@ -219,7 +219,7 @@ class Over(StrEnum):
     MEAN = "mean"
 
 
-LIMIT_OVER = Over.MAX
+LIMIT_REDUCTION = Reduction.MAX
 """Where a machine has to keep a limit, unless somebody says otherwise: everywhere in the volume."""
 
 
@@ -230,7 +230,7 @@ class SamplingPlan:
     samples: int = DEFAULT_SAMPLES
     seed: int = 0
     # |E| at one random point per machine, or its largest or mean over the points of a machine
-    over: Over | str = Over.SAMPLED
+    reduction: Reduction | str = Reduction.SAMPLED
     nodes: int = DEFAULT_NODES  # nodes per axis for `max` and `mean`
     spec_um: float | None = None  # specification whose probability is asked for, µm
     # largest workpiece; None takes it from the model's workpiece point
@@ -243,8 +243,8 @@ class SamplingPlan:
             raise OptionError(f"samples: {self.samples}; expected 1 to {SAMPLES[1]:,}")
         if self.seed < 0:
             raise OptionError(f"seed: {self.seed}; expected a whole number, 0 or above")
-        if self.over not in [*Over]:
-            raise OptionError(f"over {self.over!r}; expected one of {', '.join(Over)}")
+        if self.reduction not in [*Reduction]:
+            raise OptionError(f"over {self.reduction!r}; expected one of {', '.join(Reduction)}")
         if self.spec_um is not None and not 0.0 <= self.spec_um < np.inf:
             raise OptionError(f"specification: {self.spec_um:g} µm; expected 0 or above")
         if self.workers is not None and not WORKERS[0] <= self.workers <= WORKERS[1]:
@@ -263,7 +263,7 @@ class SamplingPlan:
 
 
 def reduce_nodes(
-    amplitudes: Array, gains: Array, over: Over | str, weights: Array | None = None
+    amplitudes: Array, gains: Array, reduction: Reduction | str, weights: Array | None = None
 ) -> Array:
     """Evaluate |E| of machines at all nodes and return its largest or mean, [n], µm.
 
@@ -288,7 +288,7 @@ def reduce_nodes(
             np.matmul(block, gain, out=term)
             np.multiply(term, term, out=term)
             np.add(square, term, out=square)
-        if over == Over.MAX:
+        if reduction == Reduction.MAX:
             result[start : start + rows] = np.sqrt(square.max(axis=1))
         elif weights is None:
             result[start : start + rows] = np.sqrt(square, out=square).mean(axis=1)
@@ -338,12 +338,12 @@ class Case:
 
     def common_places(self) -> Places:
         """Return the points for the largest or the mean of each machine."""
-        find = self.site.spread if self.plan.over == Over.MEAN else self.site.extreme
+        find = self.site.spread if self.plan.reduction == Reduction.MEAN else self.site.extreme
         return find(self.plan.nodes)
 
     def build_job(self) -> Job:
-        quantity = Over(self.plan.over)
-        if quantity is Over.SAMPLED:
+        quantity = Reduction(self.plan.reduction)
+        if quantity is Reduction.SAMPLED:
             site = self.site
 
             def one_point_each(rng: np.random.Generator, count: int) -> Array:
@@ -369,7 +369,7 @@ def both_orders(case: Case, count: int = EXACT_MACHINES) -> tuple[Array, Array]:
     view, loop = case.view, case.view.loop
     rng, n_machines = case.plan.block(0)
     amplitudes = case.draws.draw(rng, n_machines)[:count]
-    if case.plan.over == Over.SAMPLED:
+    if case.plan.reduction == Reduction.SAMPLED:
         places = case.site.random(rng, n_machines)
         axes = {
             key: np.broadcast_to(q, n_machines)[:count, None]

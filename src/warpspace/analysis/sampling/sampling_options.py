@@ -11,7 +11,7 @@ from warpspace.analysis.sampling.cases import (
     DEFAULT_SAMPLES,
     Case,
     Cylinder,
-    Over,
+    Reduction,
     SamplingPlan,
 )
 from warpspace.analysis.sampling.distribution import Distribution, Draws, build_draws
@@ -81,8 +81,10 @@ class SampledMachines(Sampled):
         high=SAMPLES[1],
     )
 
-    def plan(self, over: Over, limit_um: float | None, nodes: int = DEFAULT_NODES) -> SamplingPlan:
-        return SamplingPlan(self.samples, self.seed, over, nodes, limit_um, self.cylinder)
+    def plan(
+        self, reduction: Reduction, limit_um: float | None, nodes: int = DEFAULT_NODES
+    ) -> SamplingPlan:
+        return SamplingPlan(self.samples, self.seed, reduction, nodes, limit_um, self.cylinder)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,4 +109,4 @@ class KeptLimit(SampledMachines):
         return "everywhere" if self.over == "max" else "at a random point"
 
     def plan_of(self, limit_um: float | None) -> SamplingPlan:
-        return replace(self.plan(Over(self.over), limit_um), workers=self.workers)
+        return replace(self.plan(Reduction(self.over), limit_um), workers=self.workers)

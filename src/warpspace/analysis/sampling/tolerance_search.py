@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.analysis.sampling.cases import Case, Over
+from warpspace.analysis.sampling.cases import Case, Reduction
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
 from warpspace.units import Array
@@ -34,7 +34,6 @@ class Ensemble:
     gains: Floats
     # [3, S, K], or None; gains times unit draws, where each machine has one point
     spread: Floats | None
-    over: Over  # `sampled` for one random point per machine, `max` for the worst point of each
 
     @property
     def size(self) -> int:
@@ -95,17 +94,17 @@ def build_ensemble(case: Case) -> Ensemble:
     draws = replace(case.draws, centre=0.0 * ones, half_width=ones)
     blocks = [plan.block(index) for index in range(plan.blocks)]
     unit = np.concatenate([draws.draw(*block) for block in blocks]).astype(np.float32)
-    if plan.over == Over.SAMPLED:
+    if plan.reduction == Reduction.SAMPLED:
         parts = [
             np.broadcast_to(case.responses(case.site.random(*block)), (3, len(keys), block[1]))
             for block in blocks
         ]
         stacked = np.concatenate(parts, axis=2).astype(np.float32)
         gains = np.ascontiguousarray(np.swapaxes(stacked, 1, 2))
-        return Ensemble(keys, unit, gains, gains * unit, Over.SAMPLED)
+        return Ensemble(keys, unit, gains, gains * unit)
     refuse_many_points(case.view.loop)
     gains = case.responses(case.common_places()).astype(np.float32)
-    return Ensemble(keys, unit, gains, None, Over.MAX)
+    return Ensemble(keys, unit, gains, None)
 
 
 def refuse_many_points(loop: Loop) -> None:

@@ -12,6 +12,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Side
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_SCENE_BYTES
+from warpspace.scene.urdf import imported_text, omitted_notes, place_robot, read_robot
 
 # --- Links: a state as one word in the page's address ---------------------------------------------
 # Letters and digits only, since viser's client rewrites the address when it starts (it drops a
@@ -90,8 +91,6 @@ MOST_NOTES = 12  # remarks on a robot description
 
 def robot_text(name: str, content: bytes) -> tuple[str, list[str]]:
     """Convert a robot description (URDF) to a scene file, without meshes; return remarks , too."""
-    from warpspace.scene.urdf import imported_text, omitted_notes, place_robot, read_robot
-
     with TemporaryDirectory() as folder:
         path = Path(folder) / safe_file_name(name)
         path.write_bytes(content)

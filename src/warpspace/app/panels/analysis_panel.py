@@ -7,6 +7,7 @@ subclass of `AnalysisPanel`, registered in `page_panels.PANELS` by the name of t
 import csv
 import io
 import json
+import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -18,7 +19,18 @@ from markupsafe import Markup
 from warpspace.analysis.description import Analysis, Change, Result
 from warpspace.analysis.options import Option
 from warpspace.analysis.registry import Entry
-from warpspace.app.browser.html import EMPTY, button, join, number, rows, tag
+from warpspace.app.browser.html import (
+    EMPTY,
+    button,
+    choice,
+    field,
+    join,
+    number,
+    rows,
+    switch,
+    tag,
+    text_box,
+)
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
 from warpspace.app.evaluation.cache import exclusive_work
@@ -32,7 +44,6 @@ from warpspace.app.evaluation.compare import (
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import block_html, result_html
 from warpspace.app.panels.file_dialogs import PLAIN
-from warpspace.app.panels.form_controls import form_html
 from warpspace.app.panels.panel import Context, Job, Jobs, Section
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import LONGEST, option_values, read_form
@@ -57,6 +68,8 @@ MOST_STEPS = 4  # errors listed on a card
 SAME = 1e-3  # µm or µrad; smaller changes of an error are not listed
 RECORD = button("Record decision", "notes:decide",
                 hint="Record the change and its reason as a note")  # fmt: skip
+UNSET = ""  # value of an option that the analysis chooses
+EXAMPLES = {"X=..,Y=..": "X=0,B=30", "X,Y,Z": "100,0,50"}
 T = TypeVar("T")
 ResultKey = tuple[object, ...]
 
@@ -225,7 +238,11 @@ class AnalysisPanel(Section):
         options = [option for option in self.shown_options(state) if option.name not in OF_STATE]
         if not options:
             return EMPTY
-        form = controls + form_html(self.name, options, self.values(state), state.scene)
+        values = self.values(state)
+        form = controls + join(
+            _control(f"{self.name}:set.{option.name}", option, values.get(option.name), state.scene)
+            for option in options
+        )
         return tag("details", tag("summary", "Options") + form, class_="ws-options",
                    open=bool(self.problem_html(state)),
                    data_key=f"{self.name}.options")  # fmt: skip
@@ -356,3 +373,25 @@ def _change_html(state: AppState, change: Change) -> Markup:
         return join(lines)
     pairs = (("max", before.max_um, after.max_um), ("mean", before.mean_um, after.mean_um))
     return join(lines) + rows((name, f"{number(a)} → {number(b)} µm") for name, a, b in pairs)
+
+
+def _control(name: str, option: Option, text: str | None, scene: Scene) -> Markup:
+    hint, default = f"{option.about}.", option.default_words
+    metavar = option.grammar and option.grammar.metavar
+    if option.kind is bool:
+        return switch(name, option.label, hint=hint, on=(text or str(int(option.default))) == "1")
+    if option.choices or metavar == "AXIS":
+        keys = option.choices or tuple(scene.machine.axes)
+        titles = {key: option.choice_labels.get(key, re.sub("[_-]", " ", key)) for key in keys}
+        if not option.default:
+            titles = {UNSET: default or "automatic", **titles}
+        control = choice(name, str(option.default or UNSET) if text is None else text, titles)
+        return field(option.label, control, name, option.unit, hint)
+    if option.low is not None and option.high is not None:
+        hint += f" Range: {option.low:g} to {option.high:g}"
+    initial = "" if metavar or option.unset else default
+    control = text_box(
+        name, initial if text is None else text, size="" if metavar else "short",
+        placeholder=default or EXAMPLES.get(metavar or "", metavar or ""),
+    )  # fmt: skip
+    return field(option.label, control, name, option.unit, hint)

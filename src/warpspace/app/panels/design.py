@@ -13,7 +13,7 @@ from warpspace.analysis.blocks import Histogram
 from warpspace.analysis.description import Analysis, Result
 from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.options import Option, read_numbers
-from warpspace.analysis.sampling.cases import Case, Over, SamplingPlan
+from warpspace.analysis.sampling.cases import Case, Reduction, SamplingPlan
 from warpspace.analysis.sampling.distribution import Distribution, Draws, Probability, Stream
 from warpspace.analysis.sampling.tolerance_search import Ensemble, build_ensemble
 from warpspace.app.browser.html import (
@@ -32,7 +32,7 @@ from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.machine_edits import library
 from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import histogram_html
-from warpspace.app.panels.form_controls import setting
+from warpspace.app.panels.panel import setting
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.leaf import Identity
@@ -217,7 +217,7 @@ def sample_machines(state: AppState) -> Ensemble:
         keys = loop_keys(scene.model, state.loop, scene.parameter_keys)
         zeros = np.zeros(len(keys))
         draws = Draws(keys, zeros, zeros, Distribution(specification.distribution))
-        plan, view = SamplingPlan(SAMPLES, 0, Over(specification.over)), scene.view(state.loop)
+        plan, view = SamplingPlan(SAMPLES, 0, Reduction(specification.over)), scene.view(state.loop)
         return build_ensemble(Case(scene.model, draws, scene.workspace, view, plan))
 
     return ENSEMBLES.get(_sampled(state), build, lambda ensemble: ensemble.size)

@@ -16,8 +16,7 @@ from warpspace.app.documents.offline_page import build_offline_html, build_story
 from warpspace.app.evaluation.compare import drawn_tables, without_table
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.panel import Context, Dialog, Job, Jobs, actions
+from warpspace.app.panels.panel import Context, Dialog, Job, Jobs, actions, setting
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats

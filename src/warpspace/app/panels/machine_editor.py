@@ -32,8 +32,7 @@ from warpspace.app.evaluation.machine_bodies import (
     standing,
 )
 from warpspace.app.panels.block_html import block_html
-from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.panel import Context, Dialog, Section
+from warpspace.app.panels.panel import Context, Dialog, Section, setting
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_spans
 from warpspace.app.state.tree import leaves

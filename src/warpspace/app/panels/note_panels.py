@@ -20,8 +20,7 @@ from warpspace.app.documents.scene_file import reopened, view_of
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import explain_point, pick_worst, with_picked
-from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.panel import Context, Panel, Refresh, actions
+from warpspace.app.panels.panel import Context, Panel, Refresh, actions, setting
 from warpspace.app.state.app_state import AppState, Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.tree import leaves, set_leaf, stored

@@ -22,7 +22,20 @@ from markupsafe import Markup
 from viser import ClientHandle, ViserServer
 
 from warpspace.analysis.description import Result
-from warpspace.app.browser.html import EMPTY, button, fold, join, number, tag
+from warpspace.app.browser.html import (
+    EMPTY,
+    button,
+    choice,
+    field,
+    fold,
+    ident,
+    join,
+    number,
+    slider,
+    switch,
+    tag,
+    text_box,
+)
 from warpspace.app.browser.incoming import LONGEST_VALUE, Event, Events, event_of
 from warpspace.app.browser.page import Page
 from warpspace.app.documents.output_services import CancelledError, Services
@@ -33,6 +46,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.store import StateStore, Update
+from warpspace.app.state.tree import LONGEST, leaves, spell, value
 from warpspace.exceptions import WarpspaceError
 
 MOST_FILES = 16  # that may wait for the session
@@ -288,6 +302,27 @@ class Dialog(Panel):
 
 def actions(*buttons: Markup) -> Markup:
     return tag("div", join(buttons), class_="ws-actions")
+
+
+def setting(state: AppState, path: str, *, text: str = "", bar: bool = False) -> Markup:
+    """Render the control of a leaf of the state: a switch, a list, a text box or a slider."""
+    leaf, present, name = leaves(state)[path], value(state, path), f"state:set.{path}"
+    if leaf.kind == "switch":
+        return switch(name, leaf.label, on=bool(present), hint=leaf.hint)
+    label, control = leaf.label, text_box(name, spell(state, path))
+    if leaf.kind == "choice":
+        control = choice(name, str(present), leaf.choices)
+    elif leaf.kind == "lines":
+        control = tag("textarea", str(present), class_="ws-box", id=ident(name), rows=3,
+                      data_set=name, maxlength=LONGEST, placeholder=leaf.hint or None)  # fmt: skip
+    elif leaf.kind == "number":
+        text = text or f"{present:.6g}"
+        control = text_box(name, text, size="short", inputmode="decimal")
+        if bar and leaf.span is not None:
+            span, label = leaf.span, path.rpartition(".")[2]
+            control = slider(name, present, span.low, span.high, span.step, label=leaf.label,
+                             twin=name, text=f"{text} {leaf.unit}") + control  # fmt: skip
+    return field(label, control, name, leaf.unit, leaf.hint)
 
 
 # --- Jobs: long computations in threads of their own, with progress, cancellable ------------------

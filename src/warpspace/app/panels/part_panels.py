@@ -19,9 +19,8 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import AT_LINE, moved_place, part_overlay
 from warpspace.app.panels.analysis_panel import ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
-from warpspace.app.panels.form_controls import setting
 from warpspace.app.panels.measurement import MOST_BYTES, FilesPanel, UploadedFile
-from warpspace.app.panels.panel import actions
+from warpspace.app.panels.panel import actions, setting
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
 from warpspace.app.state.form_values import option_values

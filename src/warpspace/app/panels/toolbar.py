@@ -24,8 +24,7 @@ from warpspace.app.browser.html import (
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.panels.conventions import with_travel
-from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.panel import Panel, Refresh
+from warpspace.app.panels.panel import Panel, Refresh, setting
 from warpspace.app.state.app_state import COMPARISON_VIEWS, COMPONENT_NAMES, NOBODY, AppState, Side
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import QUANTITIES, SURFACES, slice_positions

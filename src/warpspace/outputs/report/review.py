@@ -12,7 +12,7 @@ from warpspace.analysis.commands.contributions import Contributions, Explanation
 from warpspace.analysis.commands.gains import Gains
 from warpspace.analysis.commands.montecarlo import MonteCarlo
 from warpspace.analysis.description import Analysis, Result, ignore_progress
-from warpspace.analysis.sampling.cases import LIMIT_OVER, Over, SamplingPlan
+from warpspace.analysis.sampling.cases import LIMIT_REDUCTION, Reduction, SamplingPlan
 from warpspace.analysis.sampling.distribution import choose_distribution
 from warpspace.analysis.statistics import Statistics, share_below
 from warpspace.analysis.uncertainty.propagation import FieldUncertainty, volume_uncertainty
@@ -51,7 +51,7 @@ class ReportSettings:
         loop, seed = Loop(self.loop), self.seed
         drawn = choose_distribution(self.distribution)
 
-        def machines(statistic: Over) -> MonteCarlo:
+        def machines(statistic: Reduction) -> MonteCarlo:
             return MonteCarlo(
                 loop=loop, distribution=drawn, seed=seed, samples=self.samples, over=statistic,
                 limit_um=limit_um,
@@ -62,8 +62,8 @@ class ReportSettings:
             "advice": replace(repair, objective=Objective.MAX, count=1),
             "adjust": repair,
             "gains": Gains(loop=loop, over_travel=True),
-            "worst": machines(LIMIT_OVER),
-            "sampled": machines(Over.SAMPLED),
+            "worst": machines(LIMIT_REDUCTION),
+            "sampled": machines(Reduction.SAMPLED),
             "shares": Contributions(loop=loop, distribution=drawn, seed=seed),
         }
 
