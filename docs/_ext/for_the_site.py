@@ -18,6 +18,9 @@ PAGES = {
     "examples/README.rst": "/gallery/index.rst",
     "CONVENTIONS.md": "/site/conventions.md",
     "CHANGELOG.md": "/site/changelog.md",
+    "CONTRIBUTING.md": "/site/contributing.md",
+    "GLOSSARY.md": "/site/glossary.md",
+    "SECURITY.md": "/site/security.md",
     "README.md": "/index.md",
 }
 """Pages outside this folder, and where the site shows them."""
