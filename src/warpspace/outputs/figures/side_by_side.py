@@ -165,7 +165,7 @@ def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: b
     facts = [
         *([] if plan.own_tolerances else [tolerance_words(first.scene.tolerances)]),
         f"{spell_count(plan.samples)} sampled machines each, {plan.drawn}",
-        "largest |E| of each" if plan.reduction == "max" else "|E| at a random point of each",
+        "largest |E| of each" if plan.over == "max" else "|E| at a random point of each",
         LOOP_WORDS[first.sampled.view.loop],
         view_words(settings.view, (2, 2, 2)),
     ]
