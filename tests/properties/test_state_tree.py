@@ -22,6 +22,7 @@ from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import leaves, put, spell, stored, value
 from warpspace.scene.library import load_scene
 from warpspace.scene.notes import Note, with_note
+from warpspace.scene.text_files import one_line
 
 SCENES = ("dvf5000_first", "fork_head_bc", "machine_c_frame_mill", "teach_tilted_c")
 STARTS = [start_state(load_scene(name)) for name in SCENES]
@@ -75,7 +76,9 @@ def done(state, path, text):
     if path != NOTE:
         return put(state, path, text).without_notes()
     at = dict.fromkeys(state.scene.machine.axes, 1.5)
-    note = Note(text=clean(text) or "?", author=clean(text), at=at, view=view_of(state, None))
+    note = Note(
+        text=clean(text) or "?", author=one_line(clean(text)), at=at, view=view_of(state, None)
+    )
     return replace(state, review=with_note(state.review, note))
 
 
