@@ -364,7 +364,7 @@ NIGHTLY = [
 ]
 
 
-@pytest.mark.parametrize(("name", "trials", "near"), [("tracker", 40, 0.08), *NIGHTLY])
+@pytest.mark.parametrize(("name", "trials", "near"), NIGHTLY)
 def test_what_is_stated_holds_for_95_percent_of_planted_machines(name, trials, near):
     shares, (stated, kept) = held_by_planted_machines(name, trials)
     for what, share in shares.items():
