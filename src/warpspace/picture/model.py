@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 from warpspace.analysis.commands.concepts import Concept, expected_um
 from warpspace.analysis.description import to_json
 from warpspace.analysis.statistics import Statistics, volume_statistics
-from warpspace.analysis.uncertainty.propagation import FieldUncertainty, field_uncertainty
+from warpspace.analysis.uncertainty.propagation import (
+    NOT_STATED,
+    FieldUncertainty,
+    field_uncertainty,
+)
 from warpspace.analysis.uncertainty.verdict import VERDICT_PROBABILITY
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, View, placed_words, second_order_words
@@ -93,7 +97,6 @@ QUANTITIES = {
     "uncertainty": "uncertainty of the position error",
 }
 """Quantities that colours can show."""
-NOT_STATED = "the scene states no uncertainty of its errors; expected [uncertainty]"
 DIFFERENCE_LENGTH = "|E_B − E_A|"
 """Quantity of the statistics of a difference: the length of the change of the error vector."""
 SAME_PLACE_MM = 1e-6  # nodes nearer to each other than this are the same

@@ -13,6 +13,7 @@ from warpspace.analysis.statistics import P95, Statistics, volume_statistics
 from warpspace.analysis.uncertainty.propagation import (
     COVERAGE,
     NAMES,
+    NOT_STATED,
     FieldUncertainty,
     plus_minus,
     volume_uncertainty,
@@ -27,7 +28,6 @@ from warpspace.units import Array
 
 MOSTLY = 50.0  # percent of the volume
 MOST_SHARES = 10  # errors that the table of the largest shares has
-UNSTATED = "the scene states no uncertainty of its errors; expected [uncertainty]"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +69,7 @@ class Uncertainty(Analysis):
             never_measured_percent=100.0 * float(grid.weights[beyond].sum()),
             k=uncertainty and uncertainty.errors.factor,
             unknown=uncertainty.errors.unknown if uncertainty else [*scene.errors],
-            remarks=tuple(uncertainty.errors.remarks()) if uncertainty else (UNSTATED,),
+            remarks=tuple(uncertainty.errors.remarks()) if uncertainty else (NOT_STATED,),
             title=f"{scene.title} · {self.loop} loop",
         )
         if uncertainty is None or not uncertainty.errors.is_known:

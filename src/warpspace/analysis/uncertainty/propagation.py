@@ -32,6 +32,7 @@ COVERAGE = 0.9545  # of a normal distribution, within two standard deviations
 NEAR = 0.01  # part of the points that tells how their 95th percentile moves
 MOST_DRAWN = 2_000_000  # |E| of machines that are held at a time
 SAMPLES = 17  # points that a mode along an axis is drawn through
+NOT_STATED = "the scene states no uncertainty of its errors; expected [uncertainty]"
 S = TypeVar("S", bound=Summary)
 Layer: TypeAlias = tuple[ErrorSet, tuple[str, ...]]
 

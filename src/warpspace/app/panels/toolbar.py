@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from markupsafe import Markup
 
+from warpspace.analysis.uncertainty.propagation import NOT_STATED
 from warpspace.app.browser.html import (
     EMPTY,
     button,
@@ -32,7 +33,6 @@ from warpspace.app.state.tree import leaves, put, spell
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection
 from warpspace.picture.formatting import spell_factor
-from warpspace.picture.model import NOT_STATED
 
 MACHINES = {"off": "off", "ghost": "ghost", "solid": "solid"}
 VIEWS = {"iso": "Iso", "front": "Front", "right": "Right", "top": "Top"}
