@@ -20,7 +20,7 @@ from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.field.evaluate import build_basis
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import complete_coordinates
-from warpspace.machine.axes import default_keys, is_linear, parameter
+from warpspace.machine.axes import is_linear, parameter
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.scene.model import Scene, grid_basis
@@ -357,7 +357,7 @@ def observability(
     combinations that no pose can separate from a shift of the set-up.
     """
     scene = replace(scene, errors=ErrorSet())
-    rows = [parameter(key) for key in default_keys(scene.machine.chain.axes)]
+    rows = [parameter(key) for key in scene.machine.parameter_keys]
     rows = [row for row in rows if row.is_constant and not is_linear(row.axis)]
     if not rows:
         return {}

@@ -1,21 +1,31 @@
 """Imported errors independent of the file format, and their exchange with scenes."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import chain, product
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from warpspace.analysis import blocks
+from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.source import Source, SourceLine
-from warpspace.machine.axes import TravelDirection, direction_index, is_linear, parameter
+from warpspace.kinematics.relative_motion import reading_errors
+from warpspace.machine.axes import (
+    DIRECTIONS,
+    Parameter,
+    TravelDirection,
+    direction_index,
+    is_linear,
+    parameter,
+)
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.simple import Directional
 from warpspace.machine.curves.table import TableCurve, TwoArguments
+from warpspace.machine.definition import Machine
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -72,6 +82,14 @@ class ErrorSeries:
         means = [self.mean(direction) for direction in (FORWARD, BACKWARD, UNDIRECTED)]
         return np.mean([mean for mean in means if mean is not None], axis=0)
 
+    def scaled(self, key: str, factor: float) -> "ErrorSeries":
+        """Return another error in proportion to this one."""
+        runs = (
+            replace(run, values=tuple(factor * value for value in run.values)) for run in self.runs
+        )
+        u = tuple(abs(factor) * value for value in self.uncertainty)
+        return replace(self, key=key, runs=tuple(runs), uncertainty=u)
+
     @property
     def reversal(self) -> Array | None:
         """Reversal error, [n], µm or µrad (Bᵢ = x̄ᵢ↑ − x̄ᵢ↓); None where one direction is missing."""
@@ -109,6 +127,14 @@ class ErrorSurface:
     # (first, second), µm or µrad; values for travel of the first axis in the negative direction;
     # empty where they are the same
     backward: Matrix = ()
+
+    def scaled(self, key: str, factor: float) -> "ErrorSurface":
+        """Return another error in proportion to this one."""
+        forward, backward = (
+            tuple(tuple(factor * value for value in row) for row in rows)
+            for rows in (self.values, self.backward)
+        )
+        return replace(self, key=key, values=forward, backward=backward)
 
     def table(self, direction: int) -> Array:
         """Return the values of a direction of travel, the mean of both for 0, (first, second)."""
@@ -171,6 +197,62 @@ class ImportedErrors:
             for surface in self.surfaces
         )
         return series + surfaces + len(self.constants)
+
+
+ErrorCurve = TypeVar("ErrorCurve", ErrorSeries, ErrorSurface)
+
+
+def errors_of_readings(imported: ImportedErrors, machine: Machine | None) -> ImportedErrors:
+    """Convert readings along programmed directions to the errors of the bodies that move.
+
+    The key of a reading names the axis that moves and the direction that is sensed, as programmed.
+    Constants, and errors of rotary axes, are those of the bodies already.
+    """
+    return _converted(imported, machine, _reading_shares) if machine else imported
+
+
+def readings_of_errors(imported: ImportedErrors, machine: Machine) -> ImportedErrors:
+    """Convert errors of bodies to readings; the inverse of `errors_of_readings`.
+
+    Raises
+    ------
+    OptionError
+        If the frame of an axis is not parallel to the programmed directions.
+    """
+    return _converted(imported, machine, _error_shares)
+
+
+def _converted(
+    imported: ImportedErrors,
+    machine: Machine,
+    shares_of: Callable[[Machine, Parameter], Mapping[str, float]],
+) -> ImportedErrors:
+    def parts(curves: Sequence[ErrorCurve]) -> tuple[ErrorCurve, ...]:
+        return tuple(
+            curve.scaled(key, share)
+            for curve in curves
+            for key, share in shares_of(machine, parameter(curve.key)).items()
+        )
+
+    return replace(imported, series=parts(imported.series), surfaces=parts(imported.surfaces))
+
+
+def _reading_shares(machine: Machine, row: Parameter) -> Mapping[str, float]:
+    sensed = "XYZ"[row.direction]
+    if not is_linear(row.axis) or sensed not in machine.axes:
+        return {row.key: 1.0}
+    return reading_errors(machine, row.axis, sensed, angle=row.is_rotation)
+
+
+def _error_shares(machine: Machine, row: Parameter) -> Mapping[str, float]:
+    for key in (f"E{letter}{row.axis}" for letter in DIRECTIONS):
+        shares = _reading_shares(machine, parameter(key))
+        if shares.keys() == {row.key}:
+            return {key: shares[row.key]}
+    raise OptionError(
+        f"{row.key}: the frame of {row.axis} is inclined to the programmed directions; readings"
+        " along these contain several errors"
+    )
 
 
 def merge(parts: Sequence[ImportedErrors]) -> ImportedErrors:

@@ -5,7 +5,7 @@ interpolation, the behaviour at the ends and the direction of travel are those o
 """
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -14,8 +14,9 @@ import numpy as np
 from warpspace.formats import measured
 from warpspace.formats.source import DEG_TO_URAD, Source
 from warpspace.kinematics.model import Coordinates
-from warpspace.machine.axes import direction_index, is_linear
-from warpspace.machine.definition import Machine
+from warpspace.kinematics.relative_motion import angle_error, reading_errors
+from warpspace.machine.axes import is_linear, sort_axes
+from warpspace.machine.definition import Machine, build_machine
 from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
 
 HOLD_ENDS, MODULO, EXTRAPOLATE = "held", "modulo", "extended"
@@ -176,8 +177,6 @@ class Tables:
         return total
 
 
-SQUARENESS = {("X", "Y"): ("EC0Y", -1.0), ("X", "Z"): ("EB0Z", 1.0), ("Y", "Z"): ("EA0Z", -1.0)}
-"""Squareness, and its sign, of a displacement of the first axis proportional to the second."""
 DIRECTIONS: tuple[int, ...] = (measured.FORWARD, measured.BACKWARD)
 NEGLIGIBLE = 1e-9  # µm or µrad
 
@@ -185,15 +184,17 @@ NEGLIGIBLE = 1e-9  # µm or µrad
 def errors_from_tables(
     tables: Tables, name: str, source: Source, machine: Machine | None = None
 ) -> measured.ImportedErrors:
+    carried = "" if machine is not None else ", and all axes carry the tool"
+    machine = machine or _tool_side_machine(tables)
     lines = [term for term in tables.terms if isinstance(term, AxisTable)]
-    series = [_series(key, parts, machine) for key, parts in _by_key(lines, source).items()]
+    series = [_series(key, parts) for key, parts in _by_key(lines, machine, source).items()]
     surfaces: list[measured.ErrorSurface] = []
     constants: dict[str, float] = {}
     curves: dict[str, object] = {}
     notes = list(tables.notes)
     for term in tables.terms:
         if isinstance(term, Product):
-            surfaces.append(_product_surface(term, machine, source))
+            surfaces += _product_surfaces(term, machine, source)
         elif isinstance(term, Grid3):
             grid_surfaces, ignored_um = _grid_surfaces(term, machine)
             surfaces += grid_surfaces
@@ -205,7 +206,6 @@ def errors_from_tables(
         elif isinstance(term, Affine):
             _affine(term, machine, constants, curves)
     series, surfaces = _merged(series, surfaces, source)
-    carried = "" if machine is not None else ", and all axes carry the tool"
     assumed = (*tables.assumed, f"the table corrects the entire error{carried}")
     return measured.ImportedErrors(
         name,
@@ -223,31 +223,27 @@ def errors_from_tables(
     )
 
 
-def error_key(source_axis: str, target: str) -> str:
-    """Return the error of one axis that displaces along another: EXY for X over Y."""
-    letters = "XYZ" if is_linear(target) else "ABC"
-    return f"E{letters[direction_index(target)]}{source_axis}"
+def _tool_side_machine(tables: Tables) -> Machine:
+    axes: set[str] = set()
+    for term in tables.terms:
+        if isinstance(term, Grid3 | Affine):
+            axes |= {*term.axes}
+        else:
+            parts = (term.first, term.second) if isinstance(term, Product) else (term,)
+            axes |= {axis for part in parts for axis in (part.source, part.target)}
+    return build_machine(f"wF{''.join(sort_axes(axes))}t")
 
 
-def sense(machine: Machine | None, axis: str) -> float:
-    """Return +1 if an axis moves the tool in its positive direction over the workpiece, else −1."""
-    if machine is None or axis not in machine.axes:
-        return 1.0
-    return float(machine.sense(axis))
-
-
-def side(machine: Machine | None, axis: str) -> float:
-    """Return +1 for an axis that carries the tool, −1 for one that carries the workpiece."""
-    return -1.0 if machine is not None and axis in machine.chain.workpiece else 1.0
-
-
-def _factor(machine: Machine | None, source_axis: str, target: str) -> float:
+def _factors(machine: Machine, moving: str, target: str) -> dict[str, float]:
+    """Return the errors that a correction of an axis compensates, µm or µrad per mm or degree."""
     size = UM_PER_MM if is_linear(target) else DEG_TO_URAD
-    return -size * sense(machine, target) * side(machine, source_axis)
+    return {key: -size * share for key, share in reading_errors(machine, moving, target).items()}
 
 
-def _by_key(lines: Sequence[AxisTable], source: Source) -> dict[str, list[AxisTable]]:
-    lines_by_key: defaultdict[str, list[AxisTable]] = defaultdict(list)
+def _by_key(
+    lines: Sequence[AxisTable], machine: Machine, source: Source
+) -> dict[str, list[tuple[float, AxisTable]]]:
+    parts_by_key: defaultdict[str, list[tuple[float, AxisTable]]] = defaultdict(list)
     for line in lines:
         if not is_linear(line.target) and line.source != line.target:
             source.refuse(
@@ -255,16 +251,16 @@ def _by_key(lines: Sequence[AxisTable], source: Source) -> dict[str, list[AxisTa
                 " parameter represents",
                 "tables of linear axes, or of a rotary axis over itself",
             )
-        lines_by_key[error_key(line.source, line.target)].append(line)
-    return lines_by_key
+        for key, factor in _factors(machine, line.source, line.target).items():
+            parts_by_key[key].append((factor, line))
+    return parts_by_key
 
 
-def _series(key: str, parts: Sequence[AxisTable], machine: Machine | None) -> measured.ErrorSeries:
-    at = np.unique(np.concatenate([part.positions for part in parts]))
-    factor = _factor(machine, parts[0].source, parts[0].target)
+def _series(key: str, parts: Sequence[tuple[float, AxisTable]]) -> measured.ErrorSeries:
+    at = np.unique(np.concatenate([line.positions for _, line in parts]))
     with np.errstate(over="ignore", invalid="ignore"):  # the scene refuses what is not finite
         forward, backward = (
-            factor * np.sum([part.at(at, direction) for part in parts], axis=0)
+            np.sum([factor * line.at(at, direction) for factor, line in parts], axis=0)
             for direction in DIRECTIONS
         )
     if np.array_equal(forward, backward):
@@ -276,25 +272,23 @@ def _series(key: str, parts: Sequence[AxisTable], machine: Machine | None) -> me
     return measured.ErrorSeries(key, tuple(at.tolist()), runs)
 
 
-def _product_surface(
-    term: Product, machine: Machine | None, source: Source
-) -> measured.ErrorSurface:
+def _product_surfaces(
+    term: Product, machine: Machine, source: Source
+) -> Iterator[measured.ErrorSurface]:
     axes, target = (term.first.source, term.second.source), term.first.target
     if axes[0] == axes[1] or not is_linear(target):
         source.refuse(
             f"multiplies tables over {axes[0]} and {axes[1]} for {target}",
             "tables over two axes that correct a linear axis",
         )
-    factor = _factor(machine, axes[0], target)
     places = (term.first.positions, term.second.positions)
     first, second = np.meshgrid(*places, indexing="ij")
-    tables = {direction: factor * term.at(first, second, direction) for direction in DIRECTIONS}
-    return measured.surface_from_directions(error_key(axes[0], target), axes, places, tables)
+    for key, factor in _factors(machine, axes[0], target).items():
+        tables = {direction: factor * term.at(first, second, direction) for direction in DIRECTIONS}
+        yield measured.surface_from_directions(key, axes, places, tables)
 
 
-def _grid_surfaces(
-    term: Grid3, machine: Machine | None
-) -> tuple[list[measured.ErrorSurface], float]:
+def _grid_surfaces(term: Grid3, machine: Machine) -> tuple[list[measured.ErrorSurface], float]:
     surfaces: list[measured.ErrorSurface] = []
     ignored_um = 0.0
     for index, target in enumerate(term.axes):
@@ -314,11 +308,10 @@ def _grid_surfaces(
             flat = part.squeeze(axis=3 - first - second)
             table = flat if first < second else flat.T
             axes = (term.axes[first], term.axes[second])
-            scaled: Array = _factor(machine, axes[0], target) * table
             places = (term.positions[first], term.positions[second])
-            tables = dict.fromkeys(DIRECTIONS, scaled)
-            key = error_key(axes[0], target)
-            surfaces.append(measured.surface_from_directions(key, axes, places, tables))
+            for key, factor in _factors(machine, axes[0], target).items():
+                tables = dict.fromkeys(DIRECTIONS, factor * table)
+                surfaces.append(measured.surface_from_directions(key, axes, places, tables))
     large = [surface for surface in surfaces if np.abs(surface.values).max() > NEGLIGIBLE]
     return large, ignored_um
 
@@ -369,19 +362,14 @@ def _resampled(plane: measured.ErrorSurface, direction: int, first: Array, secon
 
 
 def _affine(
-    term: Affine,
-    machine: Machine | None,
-    constants: dict[str, float],
-    curves: dict[str, object],
+    term: Affine, machine: Machine, constants: dict[str, float], curves: dict[str, object]
 ) -> None:
-    for target, row in zip(term.axes, term.matrix, strict=True):
-        for axis, value in zip(term.axes, row, strict=True):
-            if not value:
-                continue
-            if (target, axis) in SQUARENESS:
-                key, sign = SQUARENESS[target, axis]
-                turned = sense(machine, target) * sense(machine, axis)
-                constants[key] = -value * sign * turned * URAD_PER_RAD
-            else:
-                slope = value * _factor(machine, axis, target)
-                curves[error_key(axis, target)] = {"poly": [0.0, slope]}
+    for row, target in enumerate(term.axes):
+        for column, axis in enumerate(term.axes):
+            value = term.matrix[row][column]
+            if value and row < column:  # the correction makes the angle narrower, the error wider
+                key, change = angle_error(machine, target, axis)
+                constants[key] = constants.get(key, 0.0) + value * URAD_PER_RAD / change
+            elif value:
+                for key, factor in _factors(machine, axis, target).items():
+                    curves[key] = {"poly": [0.0, value * factor]}

@@ -9,7 +9,7 @@ for a constant (``EC0Y``: the squareness of Y to X). Directions X Y Z are transl
 rotations about them.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
@@ -232,31 +232,3 @@ def parameter(key: str) -> Parameter:
         classic = [row.key for axis in "XYZABC" for row in axis_parameters(axis)]
         raise UnknownNameError("error parameter", key, classic)
     return PARAMETERS[key]
-
-
-def default_keys(axes: Sequence[str]) -> tuple[str, ...]:
-    """List the parameters that a machine with these axes has by default.
-
-    Six component errors per axis; per rotary axis two orientation and two location errors; per
-    linear axis the squareness not absorbed by the reference axis, the first that the machine has in
-    the order X Y Z U V W, and the reference plane, that of the first two: the first has no
-    squareness, the second one, the third two. An axis parallel to an earlier one has the two angles
-    between them.
-    """
-    keys: list[str] = []
-    earlier: list[int] = []
-    for axis in sort_axes(axes):
-        keys += [row.key for row in axis_parameters(axis) if not row.is_constant]
-        along = direction_index(axis)
-        if is_linear(axis):
-            letters = [letter for letter in "ABC" if _turns_away(letter, along, earlier)]
-            earlier.append(along)
-        else:
-            letters = [letter for letter in "ABCXYZ" if direction_index(letter) != along]
-        keys += [f"E{letter}0{axis}" for letter in letters]
-    return tuple(keys)
-
-
-def _turns_away(letter: str, along: int, earlier: Sequence[int]) -> bool:
-    about = direction_index(letter)
-    return about != along and (along in earlier or 3 - about - along in earlier)

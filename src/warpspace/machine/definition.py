@@ -3,18 +3,24 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
+from itertools import combinations
+
+import numpy as np
 
 from warpspace.exceptions import ChainError, UnknownNameError
 from warpspace.machine.axes import (
     LINEAR_LETTERS,
     MAX_AXES,
     axis_parameters,
-    default_keys,
     direction_index,
     is_axis_name,
     is_linear,
     sort_axes,
 )
+from warpspace.units import Array
+
+PARALLEL = 1e-6  # sine of the angle between axes that no squareness exists for
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +34,11 @@ class Chain:
     def axes(self) -> tuple[str, ...]:
         """All axes of the machine in the order X Y Z U V W A B C."""
         return sort_axes({*self.workpiece, *self.tool})
+
+    def carried_by(self, axis: str) -> tuple[str, ...]:
+        """List an axis and those that it carries, which its constant errors rotate."""
+        branch = self.tool if axis in self.tool else self.workpiece
+        return branch[branch.index(axis) :]
 
     def __str__(self) -> str:
         """Write the chain in its canonical spelling, for instance ``wCBFXYZt``."""
@@ -218,19 +229,92 @@ class Machine:
         )
 
     @property
+    def _rotations(self) -> "Rotations":
+        return tuple((name, axis.rotation_deg) for name, axis in self.axes.items())
+
+    def squareness_key(self, first: str, second: str) -> str:
+        """Return the constant that changes the angle between two linear axes; empty if parallel.
+
+        It is a rotation of the later axis in the order X Y Z U V W, or of the other one if the
+        later one carries it.
+        """
+        return squareness_key(self.chain, self._rotations, first, second)
+
+    @property
     def parameter_keys(self) -> tuple[str, ...]:
-        return default_keys(self.chain.axes)
+        return default_keys(self.chain, self._rotations)
 
     @property
     def reference_keys(self) -> tuple[str, ...]:
         """Keys of the rotations of the reference axis, absorbed by the frame R by definition."""
         linear = [axis for axis in self.axes if is_linear(axis)]
-        return tuple(f"E{letter}0{axis}" for axis in linear[:1] for letter in "ABC")
+        keys = (f"E{letter}0{axis}" for axis in linear[:1] for letter in "ABC")
+        return tuple(key for key in keys if key not in self.parameter_keys)
 
     @property
     def allowed_keys(self) -> tuple[str, ...]:
         """Keys of all allowed parameters, with all constants of all axes."""
         return tuple(row.key for axis in self.axes for row in axis_parameters(axis))
+
+
+Rotations = tuple[tuple[str, Vector], ...]
+"""Fixed rotations of the frames of axes by name, degrees."""
+
+
+@cache
+def default_keys(chain: Chain, rotations: Rotations) -> tuple[str, ...]:
+    """List the parameters that a machine has by default.
+
+    Six component errors per axis; per rotary axis two orientation and two location errors; for each
+    pair of linear axes the constant that changes the angle between them, or both angles between
+    parallel axes.
+    """
+    angles: set[str] = set()
+    for first, second in combinations(filter(is_linear, chain.axes), 2):
+        key = squareness_key(chain, rotations, first, second)
+        angles |= {key} if key else set(_angles_across(second))
+    keys: list[str] = []
+    for axis in chain.axes:
+        keys += [row.key for row in axis_parameters(axis) if not row.is_constant]
+        across = _angles_across(axis)
+        if is_linear(axis):
+            keys += [key for key in across if key in angles]
+        else:
+            locations = [f"E{letter}0{axis}" for letter in "XYZ"]
+            keys += [
+                *across,
+                *(key for key in locations if "XYZ".index(key[1]) != direction_index(axis)),
+            ]
+    return tuple(keys)
+
+
+def _angles_across(axis: str) -> list[str]:
+    along = direction_index(axis)
+    return [f"E{letter}0{axis}" for about, letter in enumerate("ABC") if about != along]
+
+
+@cache
+def squareness_key(chain: Chain, rotations: Rotations, first: str, second: str) -> str:
+    frames = {axis: _frame(chain, dict(rotations), axis) for axis in (first, second)}
+    normal = np.cross(*(frames[axis][:, direction_index(axis)] for axis in (first, second)))
+    if np.linalg.norm(normal) < PARALLEL:
+        return ""
+    turned = second if first not in chain.carried_by(second) else first
+    about = int(np.argmax(np.abs(frames[turned].T @ normal)))
+    return f"E{'ABC'[about]}0{turned}"
+
+
+def _frame(chain: Chain, rotations: Mapping[str, Vector], axis: str) -> Array:
+    """Compute the rotation of the frame of an axis in R, rotary axes at zero."""
+    branch = chain.tool if axis in chain.tool else chain.workpiece
+    pose = np.eye(3)
+    for name in branch[: branch.index(axis) + 1]:
+        a, b, c = np.deg2rad(rotations.get(name, ORIGIN))
+        x = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
+        y = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
+        z = np.array([[np.cos(c), -np.sin(c), 0], [np.sin(c), np.cos(c), 0], [0, 0, 1]])
+        pose = pose @ z @ y @ x
+    return pose
 
 
 def build_machine(

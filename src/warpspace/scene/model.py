@@ -119,7 +119,7 @@ class Scene:
     @property
     def parameter_keys(self) -> tuple[str, ...]:
         """Keys of the default parameters of the machine and of other constants of the scene."""
-        default = axes.default_keys(self.machine.chain.axes)
+        default = self.machine.parameter_keys
         stated = [*self.errors, *self.tolerances.individual, *self.uncertainty]
         extra = [key for key in self.machine.allowed_keys if key in stated and key not in default]
         return (*default, *extra)

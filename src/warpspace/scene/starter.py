@@ -6,8 +6,8 @@ from typing import Any
 
 import tomli_w
 
-from warpspace.machine.axes import ErrorKind, default_keys, direction_index, is_linear, parameter
-from warpspace.machine.definition import ORIGIN, Chain, Range, Vector, parse_chain
+from warpspace.machine.axes import ErrorKind, direction_index, is_linear, parameter
+from warpspace.machine.definition import ORIGIN, Chain, Range, Vector, build_machine, parse_chain
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
 
@@ -223,7 +223,7 @@ def _example_keys(chain: Chain) -> tuple[list[tuple[str, str]], list[str]]:
     linear = [axis for axis in axes if is_linear(axis)]
     rotary = [axis for axis in axes if not is_linear(axis)]
     rows = sorted(
-        (parameter(key) for key in default_keys(chain.axes)),
+        (parameter(key) for key in build_machine(chain).parameter_keys),
         key=lambda row: row.axis not in chain.tool,
     )
     if linear:

@@ -93,7 +93,9 @@ def _to_fill_in(
 def write(corrections: RequiredCorrections) -> Files:
     """Write the errors of a scene: constants in the main file, and one further file per axis."""
     files: dict[str, str] = {}
-    for table in measured.build_error_tables(measured.sample_errors(corrections)):
+    errors = measured.sample_errors(corrections)
+    readings = measured.readings_of_errors(errors, corrections.scene.machine)
+    for table in measured.build_error_tables(readings):
         directed = [DIRECTION] if table.directed else []
         rows = [[*map(_position, table.axes), *directed, *map(_value, table.keys)]]
         for at, direction, values in table.rows:
@@ -225,8 +227,8 @@ def _column(at: SourceLine, heading: str) -> _CsvColumn:
 
 
 def read(sources: Sequence[Source], options: ReadOptions) -> measured.ImportedErrors:
-    del options
-    return measured.merge([_read_one(source) for source in sources])
+    readings = measured.merge([_read_one(source) for source in sources])
+    return measured.errors_of_readings(readings, options.machine)
 
 
 def _read_one(source: Source) -> measured.ImportedErrors:

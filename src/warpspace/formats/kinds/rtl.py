@@ -16,6 +16,7 @@ from warpspace.formats.measured import (
     ErrorSeries,
     ImportedErrors,
     MeasuredRun,
+    errors_of_readings,
     merge,
 )
 from warpspace.formats.registry import Format, ReadOptions, describe, has_pattern
@@ -170,7 +171,8 @@ def _read_one(source: Source, options: ReadOptions) -> ImportedErrors:
 
 
 def read(sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
-    return merge([_read_one(source, options) for source in sources])
+    readings = merge([_read_one(source, options) for source in sources])
+    return errors_of_readings(readings, options.machine)
 
 
 FORMATS = (

@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
-from warpspace.formats.measured import ErrorSeries, ImportedErrors, merge
+from warpspace.formats.measured import ErrorSeries, ImportedErrors, errors_of_readings, merge
 from warpspace.formats.registry import Files, Format, ReadOptions, describe, has_pattern
 from warpspace.formats.source import Source, SourceLine, format_comment, format_number
 from warpspace.formats.terms import Affine, Tables, errors_from_tables
@@ -209,7 +209,8 @@ def _twist(source: Source, options: ReadOptions) -> ImportedErrors | None:
         f"the height errors of the probe, {offset:g} mm behind the nozzle, are due to roll of X;"
         " their mean is not in the file"
     )
-    return ImportedErrors("klipper", (series,), units=("mm",), assumed=(assumption,))
+    readings = ImportedErrors("klipper", (series,), units=("mm",), assumed=(assumption,))
+    return errors_of_readings(readings, options.machine)
 
 
 def _read_klipper(sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
