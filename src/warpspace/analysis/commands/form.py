@@ -18,8 +18,10 @@ from warpspace.analysis.description import (
 from warpspace.analysis.options import LOOP_HELP, option
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
 from warpspace.exceptions import OptionError
-from warpspace.field.grid import build_grid
-from warpspace.kinematics.model import Loop
+from warpspace.field.grid import Grid, build_grid
+from warpspace.kinematics.chain import branch_pose
+from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.kinematics.relative_motion import programmed_direction
 from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene, choose_view, evaluate_grid
 from warpspace.units import Array
@@ -48,10 +50,10 @@ class FormDeviation:
 class Form(Analysis):
     """Evaluate flatness, straightness and squareness of SCENE.
 
-    What an inspector would find on a part that the bent volume is copied to. Flatness and
-    straightness are the widths of the zone between two parallel planes or lines that
-    holds all points (minimum zone, ISO 12780 and 12781). Squareness is that of the least-squares
-    lines through the middle of the volume, positive where their angle is above 90°.
+    The form that an inspector would measure on a part with the shape of the distorted volume.
+    Flatness and straightness are the widths of the minimum zone (ISO 12780, 12781) along the
+    programmed directions of the axes. Squareness is the angle between the least-squares lines
+    through the middle of the volume in their programmed positive directions, minus 90°.
     """
 
     name = "form"
@@ -65,9 +67,10 @@ class Form(Analysis):
         axes = grid.axes
         if sum(map(bool, axes)) < 2 or not all(is_linear(axis) for axis in axes if axis):
             raise OptionError("form: expected a working volume with two or three linear axes")
-        view = choose_view(scene, self.loop)
+        view = choose_view(scene, self.loop, "workpiece")
         error = evaluate_grid(scene, grid, view).error_um
-        deviations = tuple(_deviations(axes, grid.nominal_mm, error))
+        volume = FormVolume.of(scene, grid)
+        deviations = tuple(volume.deviations(error))
         uncertainty = field_uncertainty(scene, error, grid.coordinates, view, grid.point_mm)
         n_evaluations = 2 * (1 + len(uncertainty.errors.keys)) if uncertainty else 1
         advance = count_progress(watch, n_evaluations)
@@ -77,9 +80,7 @@ class Form(Analysis):
 
         def deviation_values(error_um: Array) -> Array:
             advance(1)
-            return np.array(
-                [deviation.value for deviation in _deviations(axes, grid.nominal_mm, error_um)]
-            )
+            return np.array([deviation.value for deviation in volume.deviations(error_um)])
 
         u95 = uncertainty.propagate(deviation_values)
         deviations = tuple(
@@ -87,15 +88,6 @@ class Form(Analysis):
             for deviation, expanded in zip(deviations, u95, strict=True)
         )
         return FormResult(deviations=deviations, title=scene.title, uncertainty=uncertainty.errors)
-
-
-def _deviations(axes: tuple[str, ...], nominal: Array, error: Array) -> Iterator[FormDeviation]:
-    moving = [i for i, axis in enumerate(axes) if axis]
-    for third in moving:
-        yield from _flatness(axes, nominal, error, [i for i in moving if i != third], third)
-    for axis in moving:
-        yield from _straightness(axes, nominal, error, moving, axis)
-    yield from (_squareness(axes, nominal, error, *pair) for pair in combinations(moving, 2))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,47 +129,71 @@ def zone_width(deviation: Array, *places: Array) -> float:
     return 2.0 * float(solution.x[-1])
 
 
-def _flatness(
-    axes: tuple[str, ...], nominal: Array, error: Array, plane: list[int], third: int
-) -> Iterator[FormDeviation]:
-    name = "".join(axes[i] for i in plane)
-    for word, share in PLACES.items():
-        index = round(share * (error.shape[third] - 1))
-        flat, places = (np.take(part, index, third) for part in (error[..., third], nominal))
-        width = zone_width(flat.ravel(), *(places[..., i].ravel() for i in plane))
-        at = f"{axes[third]} {np.take(nominal, index, third)[..., third].mean():.6g} mm ({word})"
-        yield FormDeviation("flatness", name, at, width, "µm")
+@dataclass(frozen=True)
+class FormVolume:
+    """Nodes of a volume by axis positions; deviations are along programmed directions."""
 
+    axes: dict[int, str]  # by dimension of the grid
+    positions: dict[int, Array]  # [n], mm
+    directions: Array  # [3, 3]; programmed directions in the workpiece frame, by dimension
 
-def _straightness(
-    axes: tuple[str, ...], nominal: Array, error: Array, moving: list[int], axis: int
-) -> Iterator[FormDeviation]:
-    across_axes = [i for i in moving if i != axis]
-    for across in across_axes:
-        widths: dict[str, float] = {}
-        for places in product(PLACES.items(), repeat=len(across_axes)):
-            index: list[slice | int] = [slice(None) if i == axis else 0 for i in range(3)]
-            for i, (_, share) in zip(across_axes, places, strict=True):
-                index[i] = round(share * (error.shape[i] - 1))
-            line = tuple(index)
-            at = ", ".join(
-                f"{axes[i]} {word}" for i, (word, _) in zip(across_axes, places, strict=True)
+    @classmethod
+    def of(cls, scene: Scene, grid: Grid) -> "FormVolume":
+        axes = {i: axis for i, axis in enumerate(grid.axes) if axis}
+        middle = complete_coordinates(scene.machine, {}, scene.workspace.positions)
+        pose = branch_pose(scene.model, "workpiece", middle)[:3, :3]
+        directions = np.zeros((3, 3))
+        for i, axis in axes.items():
+            directions[i] = pose.T @ programmed_direction(scene.model, middle, axis)
+        positions = {i: grid.coordinates[axis].ravel() for i, axis in axes.items()}
+        return cls(axes, positions, directions)
+
+    def deviations(self, error_um: Array) -> Iterator[FormDeviation]:
+        """Evaluate errors at the nodes, [nx, ny, nz, 3], µm, in the workpiece frame."""
+        error = error_um @ self.directions.T
+        for third in self.axes:
+            yield from self._flatness(error, third)
+        for axis in self.axes:
+            yield from self._straightness(error, axis)
+        yield from (self._squareness(error, *pair) for pair in combinations(self.axes, 2))
+
+    def _flatness(self, error: Array, third: int) -> Iterator[FormDeviation]:
+        plane = [i for i in self.axes if i != third]
+        places = np.meshgrid(*(self.positions[i] for i in plane), indexing="ij")
+        for word, share in PLACES.items():
+            index = round(share * (error.shape[third] - 1))
+            flat = np.take(error[..., third], index, third)
+            width = zone_width(flat.ravel(), *(place.ravel() for place in places))
+            at = f"{self.axes[third]} {self.positions[third][index]:.6g} mm ({word})"
+            name = "".join(self.axes[i] for i in plane)
+            yield FormDeviation("flatness", name, at, width, "µm")
+
+    def _straightness(self, error: Array, axis: int) -> Iterator[FormDeviation]:
+        across_axes = [i for i in self.axes if i != axis]
+        for across in across_axes:
+            widths: dict[str, float] = {}
+            for places in product(PLACES.items(), repeat=len(across_axes)):
+                index: list[slice | int] = [slice(None) if i == axis else 0 for i in range(3)]
+                for i, (_, share) in zip(across_axes, places, strict=True):
+                    index[i] = round(share * (error.shape[i] - 1))
+                at = ", ".join(
+                    f"{self.axes[i]} {word}"
+                    for i, (word, _) in zip(across_axes, places, strict=True)
+                )
+                widths[at] = zone_width(error[tuple(index)][:, across], self.positions[axis])
+            worst = max(widths, key=lambda at: widths[at])
+            name = f"{self.axes[axis]} in {self.axes[across].lower()}"
+            yield FormDeviation(
+                "straightness", name, f"worst of lines: {worst}", widths[worst], "µm"
             )
-            widths[at] = zone_width(error[line][:, across], nominal[line][:, axis])
-        worst = max(widths, key=lambda at: widths[at])
-        name = f"{axes[axis]} in {'xyz'[across]}"
-        yield FormDeviation("straightness", name, f"worst of lines: {worst}", widths[worst], "µm")
 
-
-def _squareness(
-    axes: tuple[str, ...], nominal: Array, error: Array, first: int, second: int
-) -> FormDeviation:
-    slope = 0.0
-    for axis, across in ((first, second), (second, first)):
-        index = tuple(
-            slice(None) if i == axis else (n - 1) // 2 for i, n in enumerate(error.shape[:3])
-        )
-        fit = np.polynomial.polynomial.polyfit(nominal[index][:, axis], error[index][:, across], 1)
-        slope += 1e3 * float(fit[1])  # µm over mm is mrad
-    name = f"{axes[second]} to {axes[first]}"
-    return FormDeviation("squareness", name, "through the middle", -slope, "µrad")
+    def _squareness(self, error: Array, first: int, second: int) -> FormDeviation:
+        slope = 0.0
+        for axis, across in ((first, second), (second, first)):
+            index = tuple(
+                slice(None) if i == axis else (n - 1) // 2 for i, n in enumerate(error.shape[:3])
+            )
+            fit = np.polynomial.polynomial.polyfit(self.positions[axis], error[index][:, across], 1)
+            slope += 1e3 * float(fit[1])  # µm over mm is mrad
+        name = f"{self.axes[second]} to {self.axes[first]}"
+        return FormDeviation("squareness", name, "through the middle", -slope, "µrad")

@@ -11,6 +11,7 @@ from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
 from warpspace.analysis.uncertainty.propagation import plus_minus, scene_uncertainty, u95_columns
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene, check_magnitude, evaluate
 from warpspace.units import Array
@@ -70,15 +71,14 @@ class Line(Between):
         axes = {name: low + (high - low) * share for name, (low, high) in ends}
         field = evaluate(scene, at=axes, loop=self.loop, exact=self.exact)
         watch(1.0)
-        nominal = field.nominal_mm
-        along_mm = np.concatenate(
-            [[0.0], np.cumsum(np.linalg.norm(np.diff(nominal, axis=0), axis=1))]
-        )
+        on_workpiece = np.broadcast_to(relative_point(scene.model, axes), (self.points, 3))
+        steps = np.linalg.norm(np.diff(on_workpiece, axis=0), axis=1)
+        along_mm = np.concatenate([[0.0], np.cumsum(steps)])
         return LineResult(
             length_mm=float(along_mm[-1]),
             axes={name: np.broadcast_to(at, share.shape) for name, at in axes.items()},
             along_mm=along_mm,
-            nominal_mm=nominal,
+            nominal_mm=field.nominal_mm,
             error_um=field.error_um,
             orientation_urad=field.orientation_urad,
             title=f"{scene.title} · {self.loop} loop",
@@ -97,7 +97,7 @@ class LineResult(Result):
     )  # fmt: skip
     length_mm: float
     axes: Mapping[str, Array]  # [n], mm or degrees
-    along_mm: Array  # [n], way of the nominal point
+    along_mm: Array  # [n], path of the nominal tool point over the workpiece
     nominal_mm: Array  # [n, 3], in R
     error_um: Array  # [n, 3], in R
     orientation_urad: Array  # [n, 3], in R
