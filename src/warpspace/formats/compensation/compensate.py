@@ -36,7 +36,7 @@ from warpspace.units import Array
 NODES = 28  # per axis, for the residual error: they lie between the points of usual tables
 SMALL_NODES = 7  # nodes and points per axis with which the placement of a workpiece is fitted
 STEP = 100.0  # µm and µrad; change of a placement that measures the response of a table
-MIN_SINGULAR_VALUE = 0.05  # below it the table compensates any placement by itself
+ROUNDING = 1e-4  # of the response of a table, by which its text is rounded
 PLACED_ASSUMPTION = (
     "best-fit placement: three shifts and three small rotations of the workpiece are fitted out"
     " of the errors before and after"
@@ -329,14 +329,14 @@ def compensate(
         raise OptionError(f"{{sign}} {sign!r}: expected error or correction, of a table")
     if scene.model.direction == TravelDirection.DIFFERENCE:
         scene = with_direction(scene, TravelDirection.MEAN)
-    scene = placed_for([kind], scene, loop)
+    scene, loop = placed_for([kind], scene, loop)
     corrector = build_corrector(scene, loop, orientation=options.orientation)
     points = table_points(kind, scene, options.points)
     corrections = RequiredCorrections(
         scene, corrector, points, options.resolution, sign, options.stem
     )
     check_cancelled()
-    if kind.tables is not None:
+    if kind.tables is not None and kind.offsets:
         corrections = replace(
             corrections, corrector=_with_placement(kind, kind.write, corrections, check_cancelled)
         )
@@ -364,12 +364,14 @@ def compensate(
     )  # fmt: skip
 
 
-def placed_for(kinds: Sequence[Format], scene: Scene, loop: str) -> Scene:
-    """Return the scene with best-fit placement if one of the formats has no constant offsets."""
-    if all(kind.offsets for kind in kinds):
-        return scene
-    is_relative = build_corrector(scene, loop).loop is Loop.RELATIVE
-    return replace(scene, placed=True) if is_relative else scene
+def placed_for(kinds: Sequence[Format], scene: Scene, loop: str) -> tuple[Scene, str]:
+    """Return scene and loop, with best-fit placement if one of the formats has no offsets.
+
+    Such a format only changes the shape of the part.
+    """
+    if loop == Loop.TOOL or all(kind.offsets for kind in kinds):
+        return scene, loop
+    return replace(scene, placed=True), Loop.RELATIVE
 
 
 def _with_placement(
@@ -402,10 +404,8 @@ def _with_placement(
 
     base = fitted(start)
     slopes = [(fitted(start + STEP * direction) - base) / STEP for direction in np.eye(6)]
-    left_vectors, sizes, right_vectors = np.linalg.svd(np.eye(6) - np.array(slopes).T)
-    reciprocals = np.divide(1.0, sizes, out=np.zeros(6), where=sizes > MIN_SINGULAR_VALUE)
-    placement_fit = start + right_vectors.T @ (reciprocals * (left_vectors.T @ (base - start)))
-    return replace(corrector, placement=placement_fit)
+    change = np.linalg.lstsq(np.eye(6) - np.array(slopes).T, base - start, rcond=ROUNDING)[0]
+    return replace(corrector, placement=start + change)
 
 
 @dataclass(frozen=True)
@@ -485,7 +485,8 @@ def sweep(scene: Scene, options: Compensate) -> Sweep:
     if len(tables) > MAX_TABLES:
         raise OptionError(f"{{sweep}} of {len(tables)} tables; expected at most {MAX_TABLES}")
     title = scene.title
-    scene = placed_for([find_format(name) for name in names], scene, options.loop or "")
+    scene, loop = placed_for([find_format(name) for name in names], scene, options.loop or "")
+    options = replace(options, loop=loop or None)
     before: Statistics | None = None
     steps: list[SweepStep] = []
     left_out: dict[str, str] = {}

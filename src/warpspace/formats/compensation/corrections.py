@@ -1,13 +1,14 @@
 """Corrections that a table requires at its points, averaged where it has fewer axes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import View, evaluate_exact, placement_effect
+from warpspace.field.evaluate import View, error_values, evaluate_exact, placement_effect
 from warpspace.field.grid import shares
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point, tool_axis
@@ -18,7 +19,8 @@ from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 
-NEWTON_STEPS = 2  # enough: an error changes by at most a ten-thousandth of the correction
+NEWTON_STEPS = 3  # each leaves a hundredth of a correction where bodies are inclined by 10 mrad
+FIT_STEPS = 2  # of a linear fit
 SMALL_MM, SMALL_DEG = 1e-2, 1e-3  # moves by which the response of the tool to an axis is measured
 RELATIVE_CUTOFF = 1e-3  # smallest singular value that is inverted, relative to the largest
 
@@ -39,8 +41,16 @@ class MovedPoints:
         """Compute the residual error, mm and rad; see `Corrector.residual`."""
         view = View(self.loop)
         field = evaluate_exact(self.model, errors, self.coordinates, view, self.point_mm)
+        error_um = field.error_um
+        if self.loop is Loop.RELATIVE:  # on the part, which its own errors rotate
+            values = error_values(self.model, errors, self.coordinates)
+            nominal, actual = (
+                branch_pose(self.model, "workpiece", self.coordinates, rotated)[..., :3, :3]
+                for rotated in (None, values)
+            )
+            error_um = transforms.rotate(nominal @ np.swapaxes(actual, -1, -2), error_um)
         return (
-            self.shift_mm + field.error_um * MM_PER_UM,
+            self.shift_mm + error_um * MM_PER_UM,
             self.turn_rad + field.orientation_urad * RAD_PER_URAD,
         )
 
@@ -124,9 +134,9 @@ class Corrector:
     def moves(self, coordinates: Coordinates) -> dict[str, Array]:
         shape = batch_shape(coordinates)
         total = {axis: np.zeros(shape) for axis in self.moved}
-        shift, _ = self._response(coordinates, self.axes)
+        shift, _ = self.response(coordinates, self.axes)
         inverse_shift = _inverse(shift)
-        carried, turn = self._response(coordinates, self.tilting)
+        carried, turn = self.response(coordinates, self.tilting)
         upright = _inverse(turn)
         for _ in range(NEWTON_STEPS):
             position, orientation = self.residual(coordinates, total)
@@ -138,7 +148,7 @@ class Corrector:
             total |= {a: total[a] + step[..., i] for i, a in enumerate(self.axes)}
         return total
 
-    def _response(self, coordinates: Coordinates, axes: Sequence[str]) -> tuple[Array, Array]:
+    def response(self, coordinates: Coordinates, axes: Sequence[str]) -> tuple[Array, Array]:
         shifts: list[Array] = []
         turns: list[Array] = []
         shape = (*batch_shape(coordinates), 3)
@@ -285,7 +295,11 @@ class RequiredCorrections:
         return averages
 
     def linear_fit(self, allowed: Sequence[tuple[str, str]]) -> dict[tuple[str, str], float]:
-        """Fit corrections of one axis in proportion to the position of another."""
+        """Fit corrections of one axis in proportion to the position of another.
+
+        The RMS residual error over the volume is minimised; where the placement of the workpiece is
+        fitted out, over its six numbers as well.
+        """
         scene, machine = self.scene, self.scene.machine
         missing = next((axis for axis in AXES if axis not in machine.axes), "")
         if missing:
@@ -293,24 +307,42 @@ class RequiredCorrections:
             raise OptionError(
                 f"the matrix is of X, Y and Z; the machine {machine.chain} has {axes}, no {missing}"
             )
+        corrector, axes = self.corrector, self.axes
         places = self._coarse_positions()
-        required, weights = self.corrections(places), np.ones(())
-        for _ in self.axes:
-            weights = weights[..., None] * shares(OTHER_NODES)
-        root = np.sqrt(weights).ravel()
-        at = dict(zip(self.axes, np.meshgrid(*places.values(), indexing="ij"), strict=True))
-        reference = scene.reference or {}
-        if reference:
-            still = {**scene.workspace.positions, **reference}
-            offsets = self.corrector.moves({axis: np.asarray(still[axis]) for axis in machine.axes})
-            required = {target: values - offsets[target] for target, values in required.items()}
-        coefficients: dict[tuple[str, str], float] = {}
-        for target in dict.fromkeys(target for target, _ in allowed):
-            sources = [axis for row, axis in allowed if row == target and axis in at]
-            if target in required and sources:
-                columns = [at[axis] - reference.get(axis, 0.0) for axis in sources]
-                matrix = np.stack([column.ravel() * root for column in columns], -1)
-                solved = np.linalg.lstsq(matrix, required[target].ravel() * root, rcond=None)[0]
-                keys = [(target, axis) for axis in sources]
-                coefficients.update(zip(keys, solved.tolist(), strict=True))
-        return coefficients
+        still = {name: np.asarray(q) for name, q in scene.workspace.positions.items()}
+        meshed = np.meshgrid(*(places[axis] for axis in axes), indexing="ij")
+        nodes = still | {axis: q.ravel() for axis, q in zip(axes, meshed, strict=True)}
+        root = np.ones(())
+        for _ in axes:
+            root = root[..., None] * np.sqrt(shares(OTHER_NODES))
+        pairs = [pair for pair in allowed if pair[0] in corrector.moved and pair[1] in axes]
+        targets = list(dict.fromkeys(target for target, _ in pairs))
+
+        def weighted(evaluate: Callable[[Coordinates], Array]) -> Array:
+            """Evaluate vectors at the nodes, [..., n, 3], less those of the reference point."""
+            values = evaluate(nodes)
+            if scene.reference:
+                point = {**still, **{axis: np.asarray(q) for axis, q in scene.reference.items()}}
+                values = values - evaluate(point)[..., None, :]
+            return (values * root.ravel()[:, None]).reshape(*values.shape[:-2], -1)
+
+        def effects(at: Coordinates) -> Array:
+            response, _ = corrector.response(at, targets)
+            columns = [response[..., targets.index(t)] * at[s][..., None] for t, s in pairs]
+            if scene.view(corrector.loop).placed_over is not None:
+                point = nominal_point(corrector.model, Loop.TOOL, at)
+                shifts, _ = placement_effect(corrector.model, np.eye(6), at, point)
+                columns += [-shift * MM_PER_UM for shift in shifts]
+            return np.stack(columns)
+
+        def residual(factors: Array, at: Coordinates) -> Array:
+            moves = {target: np.zeros(()) for target in targets}
+            for (target, source), factor in zip(pairs, factors, strict=True):
+                moves[target] = moves[target] + factor * at[source]
+            return corrector.residual(at, moves)[0]
+
+        design, solved = weighted(effects).T, np.zeros(len(pairs))
+        for _ in range(FIT_STEPS):
+            remaining = weighted(partial(residual, solved))
+            solved = solved - np.linalg.lstsq(design, remaining, rcond=None)[0][: len(pairs)]
+        return dict(zip(pairs, solved.tolist(), strict=True))
