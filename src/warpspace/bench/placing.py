@@ -9,9 +9,15 @@ from numpy.typing import NDArray
 from warpspace.bench.plan import BenchPlan, build_plan
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import AxisFrames, branch_frames, branch_pose, nominal_point
+from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
-from warpspace.machine.axes import direction_index, parameter
+from warpspace.kinematics.relative_motion import (
+    angle_error,
+    axis_frames,
+    programmed_direction,
+    relative_point,
+)
+from warpspace.machine.axes import direction_index
 from warpspace.machine.definition import Machine
 from warpspace.machine.limits import FULL_TURN_DEG
 from warpspace.scene.model import Scene
@@ -62,7 +68,7 @@ def _named(machine: Machine, name: str, candidates: list[str], kind: str) -> str
     return name
 
 
-def relative_point(model: Model, coordinates: Coordinates) -> Array:
+def tool_offset(model: Model, coordinates: Coordinates) -> Array:
     """Compute nominal tool point − origin of the workpiece frame, in R, [..., 3], mm."""
     tool = nominal_point(model, Loop.TOOL, coordinates)
     return tool - branch_pose(model, "workpiece", coordinates)[..., :3, 3]
@@ -76,22 +82,14 @@ def tool_points(model: Model, coordinates: Coordinates, count: int) -> Array:
 def motion_direction(model: Model, coordinates: Coordinates, axis: str) -> Array:
     """Compute the motion of the tool relative to the workpiece per unit of an axis, [..., 3]."""
     advanced = {**coordinates, axis: coordinates[axis] + 1.0}
-    return relative_point(model, advanced) - relative_point(model, coordinates)
+    return tool_offset(model, advanced) - tool_offset(model, coordinates)
 
 
 def axis_line(model: Model, coordinates: Coordinates, axis: str) -> AxisLine:
-    frames, sign = _frames_of(model, coordinates, axis)
+    frames, sign = axis_frames(model, coordinates, axis)
     before, index = np.asarray(frames.before), frames.axis.index
     along, across, upright = (before[..., :3, (index + step) % 3] for step in range(3))
     return AxisLine(before[..., :3, 3], along, across, upright, sign)
-
-
-def _frames_of(model: Model, coordinates: Coordinates, axis: str) -> tuple[AxisFrames, float]:
-    for side, sign in (("tool", 1.0), ("workpiece", -1.0)):
-        for frames in branch_frames(model, side, coordinates):
-            if frames.axis.name == axis:
-                return frames, sign
-    raise UnknownNameError("axis", axis, model.machine.axes)
 
 
 def following_axes(model: Model) -> tuple[str, str, str]:
@@ -129,12 +127,6 @@ def follow(model: Model, coordinates: Mapping[str, Array], target_mm: Array) -> 
     return start
 
 
-def ball_point(model: Model, coordinates: Coordinates) -> Array:
-    """Compute the nominal tool point in the frame of the workpiece, [..., 3], mm."""
-    pose = branch_pose(model, "workpiece", coordinates)
-    return transforms.apply(transforms.inverse(pose), nominal_point(model, Loop.TOOL, coordinates))
-
-
 def within_travel(machine: Machine, coordinates: Mapping[str, Array]) -> NDArray[np.bool_]:
     """Check at which sites all axes are within their travel, [n]; a full turn has no end."""
     inside = np.ones((), dtype=bool)
@@ -159,12 +151,7 @@ def check_travel(scene: Scene, coordinates: Mapping[str, Array], what: str) -> N
         raise OptionError(f"{what} leaves the travel: {'; '.join(problems)}")
 
 
-PLANES: Mapping[str, tuple[str, str, str]] = {
-    "XY": ("X", "Y", "EC0Y"),
-    "XZ": ("X", "Z", "EB0Z"),
-    "YZ": ("Y", "Z", "EA0Z"),
-}
-"""Axes of a plane, and the squareness between them."""
+PLANES = ("XY", "XZ", "YZ")
 
 
 @dataclass(frozen=True)
@@ -173,37 +160,28 @@ class AxisPlane:
 
     first: str  # axes
     second: str
-    key: str  # squareness between them: it turns the second axis
-    first_direction: Array  # [3]; unit vectors in R: positive directions of the frames of both axes
+    key: str  # the constant that changes the angle between them
+    first_direction: Array  # [3]; unit vectors in R: programmed positive directions
     second_direction: Array
-    # sign of the distance that a positive squareness moves the second axis along the first one, per
-    # distance along the second: −1 for Y about z (towards −x), +1 for Z about y (towards +x), −1
-    # for Z about x (towards −y)
+    # change of the angle per unit of the squareness, with the sign changed: the distance that a
+    # positive squareness moves the second axis along the first one, per distance along the second
     sign: float
 
 
-def axis_vector(model: Model, coordinates: Coordinates, axis: str, letter: str = "") -> Array:
-    """Return the direction of the frame of an axis in R, [..., 3]."""
-    frames, _ = _frames_of(model, coordinates, axis)
-    index = "XYZABC".index(letter) % 3 if letter else frames.axis.index
-    return np.asarray(frames.before)[..., :3, index]
-
-
-def plane_axes(machine: Machine, plane: str) -> tuple[str, str, str]:
+def plane_axes(machine: Machine, plane: str) -> tuple[str, str]:
     if plane not in PLANES:
         raise OptionError(f"plane {plane!r}; expected one of {', '.join(PLANES)}")
-    for name in PLANES[plane][:2]:
+    for name in plane:
         if name not in machine.axes:
             raise OptionError(f"plane {plane}: the machine {machine.chain} has no axis {name}")
-    return PLANES[plane]
+    return plane[0], plane[1]
 
 
 def find_plane(model: Model, stand: Coordinates, plane: str) -> AxisPlane:
-    first, second, key = plane_axes(model.machine, plane)
-    along, up = axis_vector(model, stand, first), axis_vector(model, stand, second)
-    about = axis_vector(model, stand, parameter(key).axis, key[1])
-    sign = float(np.sign(np.cross(about, up) @ along))
-    return AxisPlane(first, second, key, along, up, sign)
+    first, second = plane_axes(model.machine, plane)
+    directions = (programmed_direction(model, stand, axis) for axis in (first, second))
+    key, change = angle_error(model.machine, first, second)
+    return AxisPlane(first, second, key, *directions, -change)
 
 
 BAR_MM = 100.0  # length of a bar at a rotary axis: motion across it is of second order
@@ -214,7 +192,7 @@ def default_ball(
     scene: Scene, model: Model, axis: str, stand: Mapping[str, Array], radius_mm: float | None
 ) -> Array:
     """Choose the position of a ball in the workpiece frame, [3], mm."""
-    middle = np.asarray(ball_point(model, stand))
+    middle = np.asarray(relative_point(model, stand))
     line = axis_line(model, stand, axis)
     if line.sign > 0.0:  # the tool swivels about the ball
         return middle

@@ -45,6 +45,7 @@ class BenchPlan:
     setup: Mapping[str, Array]
     place: str  # description of the position on the machine
     path: tuple[IndexArray, ...] = ()  # sites of each stretch of the path, in order, for drawings
+    squareness_key: str = ""  # the constant whose value a squareness is; of diagonals three
 
     @property
     def readings(self) -> int:
@@ -65,6 +66,7 @@ def build_plan(
     travel: Mapping[str, Array] | None = None,
     setup: Mapping[str, Array] | None = None,
     path: tuple[IndexArray, ...] | None = None,
+    squareness_key: str = "",
 ) -> BenchPlan:
     """Build a plan; by default each site yields one reading of a fixed direction."""
     sites = len(point_mm)
@@ -84,6 +86,7 @@ def build_plan(
         _independent(setup or {}),
         place,
         (np.arange(sites),) if path is None else path,
+        squareness_key,
     )
 
 

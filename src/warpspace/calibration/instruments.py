@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from warpspace.analysis.blocks import Column, Table
-from warpspace.bench.placing import ball_point
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.solve import MeasurementModel
 from warpspace.exceptions import SceneError, UnknownNameError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.resources import assets_dir
 from warpspace.scene import schema
@@ -112,7 +112,7 @@ def _levers_mm(model: MeasurementModel, readings: Readings) -> Array:
     plan = readings.plan
     if plan is None:
         return readings.nominal_mm - readings.nominal_mm.mean(axis=0)
-    tip = ball_point(model.scene.model, plan.coordinates)
+    tip = relative_point(model.scene.model, plan.coordinates)
     turn = branch_pose(model.scene.model, "workpiece", readings.coordinates)[..., :3, :3]
     origin = np.where((plan.against >= 0)[:, None], tip[plan.against], tip[plan.site].mean(axis=0))
     away = transforms.rotate(turn, tip[plan.site] - origin)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from warpspace.analysis.uncertainty.propagation import coverage_factor
-from warpspace.bench.placing import PLANES, ball_point, within_travel
+from warpspace.bench.placing import PLANES, within_travel
 from warpspace.calibration import solve
 from warpspace.calibration.calibration_result import Calibration, Candidate, NextMeasurement, Target
 from warpspace.calibration.instruments import NO_INSTRUMENT, Instrument, common_mode
@@ -20,6 +20,7 @@ from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.field.evaluate import build_basis
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import complete_coordinates
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.axes import is_linear, parameter
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.limits import MAX_SCENE_BYTES
@@ -58,7 +59,7 @@ def _complete(scene: Scene, positions: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def _nominal(scene: Scene, kind: str, at: Mapping[str, Array], observed_mm: Array) -> Readings:
-    tip, count = ball_point(scene.model, at), len(observed_mm)
+    tip, count = relative_point(scene.model, at), len(observed_mm)
     lines = tuple(range(1, count + 1))
     return Readings(kind, at, tip, observed_mm, None, (SESSION,) * count, lines, "")
 
@@ -85,7 +86,8 @@ def _tests(scene: Scene) -> Iterator[Candidate]:
             title = f"probe along {name}, sensing {across} against a straight edge"
             yield from _test(scene, f"straightness:axis={name}:across={across}:points=11", title)
     yield from _test(scene, "diagonals", "laser along the four body diagonals")
-    for plane, (first, second, _) in PLANES.items():
+    for plane in PLANES:
+        first, second = plane
         if not {first, second} <= set(spans):
             continue
         yield from _test(scene, f"squareness:plane={plane}:points=11", f"square in {plane}, probed")
@@ -113,7 +115,7 @@ def _test(scene: Scene, kind: str, title: str) -> Iterator[Candidate]:
 
 def _spheres(scene: Scene) -> Iterator[Candidate]:
     at_rest = {name: np.array([value]) for name, value in scene.workspace.positions.items()}
-    centre = ball_point(scene.model, at_rest)
+    centre = relative_point(scene.model, at_rest)
     rotary = [name for name, axis in scene.machine.axes.items() if not axis.is_linear]
     travels = {name: scene.machine.axes[name].travel for name in rotary}
     turns = {

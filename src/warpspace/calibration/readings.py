@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from warpspace.bench.placing import ball_point
 from warpspace.bench.plan import BenchPlan
 from warpspace.exceptions import OptionError, SceneError, near_miss
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.axes import is_linear
 from warpspace.resources import assets_dir
 from warpspace.scene.model import Scene, coverage_notes
@@ -230,7 +230,7 @@ def build_readings(
     return Readings(
         kind,
         coordinates,
-        ball_point(scene.model, coordinates),
+        relative_point(scene.model, coordinates),
         observed_mm,
         uncertainties_mm(table),
         table.session,

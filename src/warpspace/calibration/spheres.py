@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.analysis.axis_motion import fit_flat_circle
-from warpspace.bench.placing import ball_point
 from warpspace.calibration.kinds import FreePlacementKind
 from warpspace.calibration.readings import (
     Circle,
@@ -17,6 +16,7 @@ from warpspace.calibration.readings import (
     check_spread,
 )
 from warpspace.exceptions import SceneError
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.axes import direction_index, sort_axes
 from warpspace.scene.model import Scene
 from warpspace.units import Array
@@ -114,7 +114,7 @@ class SphereKind(Centres):
                     " of the scene; its positions are used with the opposite sign"
                 )
                 notes = (*notes, note)
-        tip = ball_point(scene.model, coordinates)
+        tip = relative_point(scene.model, coordinates)
         nominal = solve_linear(scene, coordinates, mean_centres(tip, table), table.source)
         readings = build_readings(self.name, scene, table, nominal, tip, notes)
         readings = replace(readings, circles=circles)
@@ -161,9 +161,10 @@ def solve_linear(
             one_per_direction.setdefault(direction_index(name), name)
     linear = list(one_per_direction.values())
     zero = {**coordinates, **{name: np.zeros(len(target_mm)) for name in linear}}
-    start = ball_point(scene.model, zero)
+    start = relative_point(scene.model, zero)
     columns = [
-        ball_point(scene.model, {**zero, name: np.ones(len(target_mm))}) - start for name in linear
+        relative_point(scene.model, {**zero, name: np.ones(len(target_mm))}) - start
+        for name in linear
     ]
     system = np.stack(columns, -1) if columns else np.zeros((len(target_mm), 3, 0))
     solved = np.linalg.pinv(system) @ (target_mm - start)[..., None]

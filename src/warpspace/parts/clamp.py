@@ -20,9 +20,10 @@ from warpspace.analysis.uncertainty.propagation import (
     plus_minus,
     scene_uncertainty,
 )
-from warpspace.bench.placing import ball_point, following_axes
+from warpspace.bench.placing import following_axes
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.limits import MAX_FEATURE_TRIANGLES
 from warpspace.parts.workpiece import (
     Workpiece,
@@ -86,7 +87,7 @@ class Clamp(WorkpieceAnalysis):
         names = following_axes(scene.model)
         ends = np.array([*product(*(scene.machine.axes[name].travel for name in names))])
         stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
-        reach = ball_point(scene.model, {**stand, **dict(zip(names, ends.T, strict=True))})
+        reach = relative_point(scene.model, {**stand, **dict(zip(names, ends.T, strict=True))})
         level, places = part.vertices_mm[:, 2].min(), list[tuple[float, ...]]()
         for tilt, quarter in product(tilts, quarters):
             turn = (*tilt, c + 90.0 * quarter)

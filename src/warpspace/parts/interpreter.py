@@ -28,10 +28,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.options import Grammar, option, read_numbers
-from warpspace.bench.placing import ball_point, follow
+from warpspace.bench.placing import follow
 from warpspace.exceptions import SceneError
 from warpspace.formats.source import MAX_LINE, MAX_LINES
 from warpspace.kinematics.model import Model, complete_coordinates
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import (
     MAX_CYCLE,
@@ -167,7 +168,7 @@ def upright(positions: Mapping[str, Array]) -> dict[str, Array]:
 
 def axes_at(model: Model, length_mm: float, programmed: Mapping[str, Array]) -> dict[str, Array]:
     """Compute axis positions from the words of a program with TCP."""
-    tip_mm = ball_point(model, upright(programmed))
+    tip_mm = relative_point(model, upright(programmed))
     return follow(with_length(model, length_mm), programmed, tip_mm)
 
 
@@ -359,7 +360,7 @@ class Interpreter:
             if self.tcp:
                 at = axes_at(model, self.length_mm, at)
             if tcp:
-                at = programmed_words(model, ball_point(with_length(model, length_mm), at), at)
+                at = programmed_words(model, relative_point(with_length(model, length_mm), at), at)
             self.position, self.tcp, self.length_mm = [*map(float, at.values())], tcp, length_mm
             self.record(STAND)
         self.length_mm = length_mm

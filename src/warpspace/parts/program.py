@@ -38,11 +38,12 @@ from warpspace.analysis.uncertainty.propagation import (
     scene_uncertainty,
     u95_lines,
 )
-from warpspace.bench.placing import ball_point, follow, following_axes, within_travel
+from warpspace.bench.placing import follow, following_axes, within_travel
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.formats.source import MAX_LINES, format_comment, format_number
 from warpspace.kinematics.model import Loop
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import FULL_TURN_DEG, MAX_LINE_POINTS, MAX_PATH_POINTS
 from warpspace.parts import interpreter
@@ -205,7 +206,7 @@ def along_moves(
             if tcp:
                 axes = interpreter.axes_at(scene.model, length, axes)
             if shift_mm is not None:
-                axes = follow(model, axes, ball_point(model, axes) + shift_mm[rows])
+                axes = follow(model, axes, relative_point(model, axes) + shift_mm[rows])
             for name, axis in scene.machine.axes.items():
                 low, high = axis.travel
                 if not axis.is_linear and high - low >= FULL_TURN_DEG:  # without full turns
@@ -214,7 +215,7 @@ def along_moves(
                     axes[name] = np.where(is_out, turned, axes[name])
                 positions[name][rows] = axes[name]
             check_magnitude(scene, axes)
-            tip[rows] = ball_point(model, axes)
+            tip[rows] = relative_point(model, axes)
             error[rows] = evaluate_first_order(model, scene.errors, axes, view).error_um
     return positions, tip, error
 

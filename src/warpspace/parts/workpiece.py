@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from warpspace.analysis.description import Analysis
 from warpspace.analysis.options import File, Grammar, option
 from warpspace.analysis.uncertainty.propagation import FieldUncertainty, combine, scene_uncertainty
-from warpspace.bench.placing import ball_point, follow, within_travel
+from warpspace.bench.placing import follow, within_travel
 from warpspace.bodies.mesh import CREASE_DEG
 from warpspace.bodies.mesh_files import read_mesh
 from warpspace.exceptions import OptionError
@@ -25,6 +25,7 @@ from warpspace.field.evaluate import ErrorBasis, build_basis
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_LENGTH_MM, MAX_PART_TRIANGLES
 from warpspace.scene.model import Scene, evaluate
 from warpspace.scene.text_files import parse_number
@@ -213,7 +214,7 @@ def place_workpiece(
     at = scene.part.place if place is None else (*place, 0.0, 0.0, 0.0)[:6]
     if at is None:
         stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
-        at = (*(ball_point(scene.model, stand) - mesh.middle_mm).tolist(), 0.0, 0.0, 0.0)
+        at = (*(relative_point(scene.model, stand) - mesh.middle_mm).tolist(), 0.0, 0.0, 0.0)
     pose = transforms.placed(at[:3], at[3:])
     return replace(mesh, vertices_mm=transforms.apply(pose, mesh.vertices_mm), place=at)
 

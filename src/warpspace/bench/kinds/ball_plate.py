@@ -73,7 +73,7 @@ class BallPlate(BenchTest):
         return self._lay(scene, indices["position"], indices["row"], indices["column"]), readings
 
     def _lay(self, scene: Scene, number: Array, row: Array, column: Array) -> BenchPlan:
-        first, second, _ = placing.plane_axes(scene.machine, self.plane)
+        first, second = placing.plane_axes(scene.machine, self.plane)
         names = placing.following_axes(scene.model)
         third = next(name for name in names if name not in (first, second))
         stand, model = self.axis_positions(scene), self.model(scene)
@@ -89,11 +89,11 @@ class BallPlate(BenchTest):
         }
         count = len(number)
         point = placing.tool_points(model, coordinates, count)
-        axes = np.stack([placing.axis_vector(model, stand, name) for name in names], -1)
-        nominal = np.broadcast_to(placing.relative_point(model, coordinates), (count, 3)) @ axes
-        sign = placing.find_plane(model, stand, self.plane).sign
+        axes = np.stack([placing.programmed_direction(model, stand, name) for name in names], -1)
+        nominal = np.broadcast_to(placing.tool_offset(model, coordinates), (count, 3)) @ axes
+        plane = placing.find_plane(model, stand, self.plane)
         marks = {"position": number, "row": row, "column": column}
-        marks["gain_sign"] = np.full(count, sign)
+        marks["gain_sign"] = np.full(count, plane.sign)
         marks |= {f"seen_{axis}_mm": nominal[:, index] for index, axis in enumerate("xyz")}
         return build_plan(
             coordinates,
@@ -106,6 +106,7 @@ class BallPlate(BenchTest):
             site=np.tile(np.arange(count), 3),
             setup=_plate_setup(number, nominal),
             path=tuple(np.flatnonzero(number == index) for index in np.unique(number)),
+            squareness_key=plane.key,
         )
 
     def _side(self, scene: Scene, name: str, index: Array) -> Array:
@@ -122,7 +123,7 @@ class BallPlate(BenchTest):
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         residual_um = plate_residuals(plan, readings)
-        first, second, key = placing.PLANES[self.plane]
+        first, second = self.plane
         sign = float(plan.marks["gain_sign"][0])
         nominal = np.stack([plan.marks[f"seen_{axis}_mm"] for axis in "xyz"], -1)[
             : len(residual_um)
@@ -156,7 +157,10 @@ class BallPlate(BenchTest):
             BenchQuantity("length_error_um", "largest error of a distance",
                      worst("length_error_um"), "µm"),
             BenchQuantity(
-                "squareness_urad", f"squareness {key}, mean", mean("squareness_urad"), "µrad"
+                "squareness_urad",
+                f"squareness {plan.squareness_key}, mean",
+                mean("squareness_urad"),
+                "µrad",
             ),
             *(
                 BenchQuantity(f"scale_{axis}_um_per_m", f"scale of {axis}, mean",
@@ -166,10 +170,10 @@ class BallPlate(BenchTest):
             BenchQuantity("flatness_um", "largest height of the plate", worst("flatness_um"), "µm"),
             BenchQuantity("rms_um", "RMS of a position, mean", mean("rms_um"), "µm"),
         )  # fmt: skip
-        return Outcome(quantities, {"positions": rows, "squareness_key": key})
+        return Outcome(quantities, {"positions": rows, "squareness_key": plan.squareness_key})
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
-        first, second = placing.PLANES[self.plane][:2]
+        first, second = self.plane
         columns = ["XYZ".index(name) for name in (first, second)]
         largest = max(float(np.abs(plate_residuals(run.plan, run.readings)).max()) for run in runs)
         marks = runs[0].plan.marks

@@ -183,7 +183,7 @@ class Circular(BenchTest):
         if self.rotary:
             how = self.rotary, self.radius_mm, self.bar, self.axis_positions(scene)
             return placing.plan_followed_circle(scene, self.model(scene), *how, angle_deg, sense)
-        first, second, _ = placing.plane_axes(scene.machine, self.plane)
+        first, second = placing.plane_axes(scene.machine, self.plane)
         if not 0.0 < self.radius_mm < np.inf:
             raise OptionError(f"radius: {self.radius_mm:g} mm; expected above 0")
         model, stand = self.model(scene), self.axis_positions(scene)
@@ -196,7 +196,7 @@ class Circular(BenchTest):
             first: middle[first] + self.radius_mm * np.append(np.cos(theta), 0.0),
             second: middle[second] + self.radius_mm * np.append(np.sin(theta), 0.0),
         }
-        relative = placing.relative_point(model, coordinates)
+        relative = placing.tool_offset(model, coordinates)
         outward = relative[:-1] - relative[-1]
         outward = outward / np.linalg.norm(outward, axis=-1, keepdims=True)
         # slightly ahead: at a point of reversal an axis is about to move
@@ -222,7 +222,7 @@ class Circular(BenchTest):
                 f"centre_{second}_um": outward @ plane.second_direction,
                 "bar_um": np.ones(count),
             },
-            path=(np.arange(count),),
+            path=(np.arange(count),), squareness_key=plane.key,
         )  # fmt: skip
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
@@ -253,17 +253,19 @@ class Circular(BenchTest):
         quantities.append(BenchQuantity("radius_um", "mean radius − nominal", radius, "µm"))
         details: dict[str, object] = {}
         if fit.shear_um is not None and not self.rotary:
-            first, second, key = placing.PLANES[self.plane]
+            first, second = self.plane
             lever = plan.marks["gain_sign"][0] * self.radius_mm * UM_PER_MM_URAD
             squareness = float(2.0 * fit.shear_um / lever)
             quantities += [
-                BenchQuantity("squareness_urad", f"squareness {key}", squareness, "µrad"),
                 BenchQuantity(
-                    "scale_difference_um", f"{first} longer than {second}",
+                    "squareness_urad", f"squareness {plan.squareness_key}", squareness, "µrad"
+                ),
+                BenchQuantity(
+                    "scale_difference_um", f"{first} longer than {second}, of the radius",
                     fit.scale_difference_um, "µm",
                 ),
             ]  # fmt: skip
-            details["squareness_key"] = key
+            details["squareness_key"] = plan.squareness_key
         details["centre_um"] = list(fit.centre_um)
         details["angle_deg"] = plan.marks["angle_deg"].tolist()
         details["radial_um"] = fit.radial_um.tolist()

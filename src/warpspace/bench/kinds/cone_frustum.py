@@ -16,6 +16,7 @@ from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, tool_axis
 from warpspace.kinematics.model import Model
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.definition import Machine
 from warpspace.scene.model import Scene
 from warpspace.units import Array
@@ -134,7 +135,7 @@ class ConeFrustum(BenchTest):
             )
         model, stand = self.model(scene), self.axis_positions(scene)
         middle = (
-            np.asarray(placing.ball_point(model, stand))
+            np.asarray(relative_point(model, stand))
             if self.centre is None
             else np.asarray(self.centre, dtype=float)
         )

@@ -11,7 +11,7 @@ from warpspace.analysis.options import option
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ALONG, DataColumn, ReadingsFile
 from warpspace.bench.kinds.positioning import target_statistics
-from warpspace.bench.placing import PLANES, find_plane, following_axes, relative_point, tool_points
+from warpspace.bench.placing import PLANES, find_plane, following_axes, tool_offset, tool_points
 from warpspace.bench.plan import BenchPlan, BenchQuantity, IndexArray, Outcome, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
@@ -57,7 +57,7 @@ def squareness_of_diagonals(
         return {}
     size = np.array([np.ptp(plan.marks["position_mm"][rows]) for rows in start.values()])
     first = [rows[0] for rows in start.values()]
-    keys = [key for _, _, key in PLANES.values()]
+    keys = plan.squareness_key.split()
     columns = [plan.marks[key][first] * size for key in keys]
     if len(names) == len(BODY):
         design = np.stack([np.ones(len(names)), *columns], -1)
@@ -195,7 +195,7 @@ class Diagonals(BenchTest):
             return {**self.axis_positions(scene), **dict(zip(axes, at.T, strict=True))}
 
         def relative_points(at: Array) -> Array:
-            return np.asarray(relative_point(model, positions_at(at)))
+            return np.asarray(tool_offset(model, positions_at(at)))
 
         along = relative_points(end) - relative_points(start)
         along = along / np.linalg.norm(along, axis=-1, keepdims=True)
@@ -210,10 +210,10 @@ class Diagonals(BenchTest):
             f"zero_{name}_um": (index == number).astype(float)
             for number, name in enumerate(self.names)
         }
-        for plane, (_, _, key) in PLANES.items():
-            axis_plane = find_plane(model, self.axis_positions(scene), plane)
-            product = (along @ axis_plane.first_direction) * (along @ axis_plane.second_direction)
-            marks[key] = 1e-3 * axis_plane.sign * product[index]
+        planes = [find_plane(model, self.axis_positions(scene), plane) for plane in PLANES]
+        for plane in planes:
+            product = (along @ plane.first_direction) * (along @ plane.second_direction)
+            marks[plane.key] = 1e-3 * plane.sign * product[index]
         ends = np.flatnonzero(np.diff(index, append=-1) != 0) + 1
         return build_plan(
             coordinates,
@@ -226,6 +226,7 @@ class Diagonals(BenchTest):
             travel=dict(zip(axes, travel_signs.T, strict=True)),
             setup=zero,
             path=tuple(np.split(rows, ends[:-1])),
+            squareness_key=" ".join(plane.key for plane in planes),
         )  # fmt: skip
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:

@@ -15,6 +15,7 @@ from warpspace.bench.kinds.circular import is_full
 from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan, fit_setup
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -84,7 +85,7 @@ class RotaryAxis(BenchTest):
         height = self.height_mm
         if height is None:
             tool = transforms.apply(
-                branch_pose(model, "workpiece", stand), placing.ball_point(model, stand)
+                branch_pose(model, "workpiece", stand), relative_point(model, stand)
             )
             height = float((tool - line.origin_mm) @ line.direction)
         count = len(angle_deg)

@@ -14,6 +14,7 @@ from warpspace.bench.data import ALONG, DataColumn, ReadingsFile
 from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.conversion import fit_line
+from warpspace.machine.axes import direction_index
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -77,8 +78,7 @@ def build_line_plan(
         on_line = line_index == number
         coordinates[axis] = np.where(on_line, position, stand[axis])
         travel[axis] = np.where(on_line, travel_sign, 0.0)
-        sign = np.sign(forth @ placing.axis_vector(model, stand, axis))
-        along[on_line], across[on_line] = sign * position[on_line], direction
+        along[on_line], across[on_line] = position[on_line], direction
     zeros = [(line_index == number).astype(float) for number in range(len(lines))]
     first = next(iter(lines))
     return build_plan(
@@ -121,8 +121,7 @@ class Straightness(BenchTest):
 
     def directions(self, scene: Scene) -> tuple[str, int]:
         axis = placing.linear_axis(scene.machine, self.axis)
-        vector = placing.axis_vector(scene.model, self.axis_positions(scene), axis)
-        along = int(np.argmax(np.abs(vector)))
+        along = direction_index(axis)
         if self.across and "xyz".index(self.across) == along:
             raise OptionError(
                 f"{{across}} {self.across} is the direction of {axis}; expected one across it"
@@ -146,7 +145,11 @@ class Straightness(BenchTest):
 
     def _lay(self, scene: Scene, position: Array, travel_sign: Array) -> BenchPlan:
         axis, across = self.directions(scene)
-        lines, line_index = {axis: np.eye(3)[across]}, np.zeros(len(position))
+        sensed, stand = "XYZ"[across], self.axis_positions(scene)
+        direction = np.eye(3)[across]
+        if sensed in scene.machine.axes:
+            direction = placing.programmed_direction(scene.model, stand, sensed)
+        lines, line_index = {axis: direction}, np.zeros(len(position))
         return build_line_plan(
             self, scene, lines, line_index, position, travel_sign, ("zero_um", "tilt_urad")
         )
@@ -215,7 +218,7 @@ class Squareness(BenchTest):
     points: int = option(21, "Positions along each axis", low=3, high=2_000)
 
     def plan(self, scene: Scene) -> BenchPlan:
-        axes = placing.plane_axes(scene.machine, self.plane)[:2]
+        axes = placing.plane_axes(scene.machine, self.plane)
         positions = [np.linspace(*scene.axis_span(axis), self.points) for axis in axes]
         return self._lay(
             scene,
@@ -225,7 +228,7 @@ class Squareness(BenchTest):
         )
 
     def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
-        axes = placing.plane_axes(scene.machine, self.plane)[:2]
+        axes = placing.plane_axes(scene.machine, self.plane)
         expected = f"{axes[0]} or {axes[1]} (--plane {self.plane})"
         problems = table.unknown_labels("line", axes, expected)
         line_index = np.array([float(word == axes[1]) for word in table.labels["line"]])
@@ -253,10 +256,11 @@ class Squareness(BenchTest):
             "gain_sign": np.full(len(line_index), plane.sign),
             "line": line_index,
         }
-        return replace(plan, place=f"{self.plane} · {plan.place}", marks=marks)
+        place = f"{self.plane} · {plan.place}"
+        return replace(plan, place=place, marks=marks, squareness_key=plane.key)
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
-        key, sign = placing.PLANES[self.plane][2], float(plan.marks["gain_sign"][0])
+        key, sign = plan.squareness_key, float(plan.marks["gain_sign"][0])
         lines = [arm_lines for _, _, arm_lines in _arms(plan, readings)]
         quantities: list[BenchQuantity] = []
         for name in REFERENCES:
