@@ -179,9 +179,9 @@ def plane_axes(machine: Machine, plane: str) -> tuple[str, str]:
 
 def find_plane(model: Model, stand: Coordinates, plane: str) -> AxisPlane:
     first, second = plane_axes(model.machine, plane)
-    directions = (programmed_direction(model, stand, axis) for axis in (first, second))
+    along, up = (programmed_direction(model, stand, axis) for axis in (first, second))
     key, change = angle_error(model.machine, first, second)
-    return AxisPlane(first, second, key, *directions, -change)
+    return AxisPlane(first, second, key, along, up, -change)
 
 
 BAR_MM = 100.0  # length of a bar at a rotary axis: motion across it is of second order

@@ -247,7 +247,7 @@ def _reading_shares(machine: Machine, row: Parameter) -> Mapping[str, float]:
 def _error_shares(machine: Machine, row: Parameter) -> Mapping[str, float]:
     for key in (f"E{letter}{row.axis}" for letter in DIRECTIONS):
         shares = _reading_shares(machine, parameter(key))
-        if shares.keys() == {row.key}:
+        if {*shares} == {row.key}:
             return {key: shares[row.key]}
     raise OptionError(
         f"{row.key}: the frame of {row.axis} is inclined to the programmed directions; readings"

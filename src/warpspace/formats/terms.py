@@ -310,7 +310,8 @@ def _grid_surfaces(term: Grid3, machine: Machine) -> tuple[list[measured.ErrorSu
             axes = (term.axes[first], term.axes[second])
             places = (term.positions[first], term.positions[second])
             for key, factor in _factors(machine, axes[0], target).items():
-                tables = dict.fromkeys(DIRECTIONS, factor * table)
+                scaled: Array = factor * table
+                tables = dict.fromkeys(DIRECTIONS, scaled)
                 surfaces.append(measured.surface_from_directions(key, axes, places, tables))
     large = [surface for surface in surfaces if np.abs(surface.values).max() > NEGLIGIBLE]
     return large, ignored_um

@@ -296,7 +296,8 @@ def _angles_across(axis: str) -> list[str]:
 @cache
 def squareness_key(chain: Chain, rotations: Rotations, first: str, second: str) -> str:
     frames = {axis: _frame(chain, dict(rotations), axis) for axis in (first, second)}
-    normal = np.cross(*(frames[axis][:, direction_index(axis)] for axis in (first, second)))
+    along = [frames[axis][:, direction_index(axis)] for axis in (first, second)]
+    normal = np.cross(along[0], along[1])
     if np.linalg.norm(normal) < PARALLEL:
         return ""
     turned = second if first not in chain.carried_by(second) else first
