@@ -64,7 +64,7 @@ def measured(
     scene: Scene,
     *,
     tolerances: ToleranceSet | None = None,
-    loop: Loop | str = Loop.TOOL,
+    loop: Loop | str | None = None,
     grid: int | Sequence[int] = PREDICTED_NODES,
 ) -> Measured:
     """Check the errors of a scene against tolerances and predict its volumetric error.

@@ -40,7 +40,7 @@ def print_field(
     scene: str,
     points: tuple[str, ...],
     grid: int | None,
-    loop: str,
+    loop: str | None,
     frame: str,
     direction: str | None,
     csv_path: str | None,
@@ -88,7 +88,7 @@ def print_field(
             for path in files:
                 write_field(FieldRecord(axes, result, about, u95), path, overwrite=force)
     if as_json:
-        document: dict[str, object] = {"loop": loop, "frame": frame}
+        document: dict[str, object] = {"loop": view.loop, "frame": frame}
         document["statistics"] = to_json(summary)
         document |= {} if view.placed_over is None else {"placement": "fitted out"}
         document |= estimate
@@ -114,7 +114,7 @@ def print_field(
         _print_json(axes, result, document, u95)
         return
     conditions = (*direction_words(loaded), *placed_words(view))
-    headings = (f"{loop} loop", *conditions, "exact" if exact else "first order")
+    headings = (f"{view.loop} loop", *conditions, "exact" if exact else "first order")
     print_text(" · ".join((loaded.title, *headings)))
     if points:
         units = [loaded.machine.axes[name].unit for name in axes]

@@ -9,7 +9,6 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
-from click.core import ParameterSource
 
 from warpspace.analysis.options import outside_travel, read_place
 from warpspace.cli.file_arguments import OutputFile, SceneName
@@ -63,26 +62,17 @@ json_option = click.option(
 )
 
 
-def placed_loop(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """Choose the relative loop with --placed, unless a loop is set."""
-    is_set = ctx.get_parameter_source(param.name or "") is not ParameterSource.DEFAULT
-    return "relative" if ctx.params.get("placed") and not is_set else value
-
-
 placed_option = click.option(
     "--placed",
     is_flag=True,
-    is_eager=True,
     help="Remove the best-fit placement of the workpiece: three shifts and three small rotations"
     " that minimise the RMS error over the working volume. Uses the relative loop.",
 )
 loop_option = click.option(
     "--loop",
     type=click.Choice(LOOPS),
-    default="tool",
-    show_default=True,
-    callback=placed_loop,
-    help="Structural loop: tool point, workpiece point, or tool relative to workpiece.",
+    help="Structural loop: tool point, workpiece point, or tool relative to workpiece.  [relative"
+    " where an axis carries the workpiece, else tool]",
 )
 direction_option = click.option(
     "--direction",
@@ -152,7 +142,9 @@ def warn_outside_travel(machine: "Machine", point: Mapping[str, float]) -> None:
     warn(*(f"--at {words}" for words in outside_travel(machine, point)))
 
 
-def load_placed(name: str, direction: str | None, loop: str, *, placed: bool = False) -> "Scene":
+def load_placed(
+    name: str, direction: str | None, loop: str | None, *, placed: bool = False
+) -> "Scene":
     """Load a scene for a direction of travel, its best-fit placement removed or not."""
     from warpspace.scene.library import load_scene
     from warpspace.scene.model import with_direction, with_placement
@@ -160,7 +152,7 @@ def load_placed(name: str, direction: str | None, loop: str, *, placed: bool = F
     return with_placement(with_direction(load_scene(name), direction), loop, placed=placed)
 
 
-def warn_first_order(loop: str, *scenes: "Scene") -> None:
+def warn_first_order(loop: str | None, *scenes: "Scene") -> None:
     from warpspace.scene.model import second_order
 
     warn_second_order(*(second_order(scene, loop) for scene in scenes))

@@ -415,7 +415,7 @@ def evaluate_picture(
     scene: Scene,
     *,
     grid: int = DEFAULT_NODES,
-    loop: Loop | str = Loop.TOOL,
+    loop: Loop | str | None = None,
     exaggeration: Exaggeration = None,
     component: str = "norm",
     quantity: str = "position",

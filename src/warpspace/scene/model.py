@@ -129,8 +129,15 @@ class Scene:
         low, high = self.workspace.ranges[axis]
         return (low, high) if low < high else self.machine.axes[axis].travel
 
-    def view(self, loop: Loop = Loop.TOOL, frame: str = "machine") -> View:
+    @property
+    def default_loop(self) -> Loop:
+        """Tool relative to workpiece where an axis carries the workpiece; else the tool."""
+        carried = self.placed or self.machine.chain.workpiece
+        return Loop.RELATIVE if carried else Loop.TOOL
+
+    def view(self, loop: Loop | None = None, frame: str = "machine") -> View:
         """Return the view of the scene for a loop, with the reference of the scene."""
+        loop = loop or self.default_loop
         fitted_over = self.workspace if self.placed and loop is Loop.RELATIVE else None
         return View(loop, frame, self.reference, fitted_over)
 
@@ -144,7 +151,7 @@ def evaluate(
     *,
     at: Mapping[str, ArrayLike] | None = None,
     grid: int | Sequence[int] | None = None,
-    loop: Loop | str = Loop.TOOL,
+    loop: Loop | str | None = None,
     exact: bool = False,
     frame: str = "machine",
     placed: bool = False,
@@ -160,8 +167,9 @@ def evaluate(
     grid : int or sequence of int, (3,), optional
         Nodes per axis of the working volume; 21 by default.
     loop : Loop or str, optional
-        "tool", "workpiece" or "relative". At points the workpiece loop takes the scene's functional
-        workpiece point; over the grid the workpiece points that nominally coincide with the nodes.
+        "tool", "workpiece" or "relative"; by default relative where an axis carries the workpiece,
+        else tool. At points the workpiece loop takes the scene's functional workpiece point; over
+        the grid the workpiece points that nominally coincide with the nodes.
     exact : bool, optional
         Full rotations and all products instead of the first order.
     frame : str, optional
@@ -228,9 +236,9 @@ def with_direction(scene: Scene, direction: str | None) -> Scene:
     return replace(scene, model=replace(scene.model, direction=axes.TravelDirection(direction)))
 
 
-def with_placement(scene: Scene, loop: Loop | str, *, placed: bool = True) -> Scene:
+def with_placement(scene: Scene, loop: Loop | str | None, *, placed: bool = True) -> Scene:
     """Return a scene with a best-fit placement of the workpiece, if `placed`."""
-    if placed and loop != Loop.RELATIVE:
+    if placed and loop and loop != Loop.RELATIVE:
         raise OptionError(
             f"placed: the {loop} loop does not contain the placement of the workpiece; expected"
             f" loop {Loop.RELATIVE}"
@@ -238,7 +246,14 @@ def with_placement(scene: Scene, loop: Loop | str, *, placed: bool = True) -> Sc
     return replace(scene, placed=True) if placed else scene
 
 
-def choose_view(scene: Scene, loop: Loop | str, frame: str = "machine") -> View:
+def common_loop(scenes: Sequence[Scene], loop: Loop | str | None) -> Loop:
+    """Return the loop of several scenes: the stated one, else relative if it is that of any."""
+    defaults = [scene.default_loop for scene in scenes]
+    return Loop(loop or (Loop.RELATIVE if Loop.RELATIVE in defaults else Loop.TOOL))
+
+
+def choose_view(scene: Scene, loop: Loop | str | None, frame: str = "machine") -> View:
+    loop = loop or scene.default_loop
     if loop not in [*Loop]:
         raise OptionError(f"loop {loop!r}; expected one of {', '.join(Loop)}")
     if frame not in FRAMES:
@@ -262,7 +277,7 @@ def grid_basis(
 
 def second_order(
     scene: Scene,
-    loop: Loop | str = Loop.TOOL,
+    loop: Loop | str | None = None,
     *,
     at: Mapping[str, ArrayLike] | None = None,
 ) -> SecondOrder:

@@ -17,7 +17,7 @@ from warpspace.analysis.description import (
     Result,
     ignore_progress,
 )
-from warpspace.analysis.options import ALL, LOOP_HELP, PLACED_HELP, Keys, Limits, option
+from warpspace.analysis.options import ALL, LOOP_HELP, LOOP_UNSET, PLACED_HELP, Keys, Limits, option
 from warpspace.analysis.statistics import Summary, volume_statistics
 from warpspace.analysis.uncertainty.propagation import (
     FieldUncertainty,
@@ -32,7 +32,7 @@ from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import Parameter, parameter
 from warpspace.machine.limits import MAX_ERROR, MAX_TEXT, MIN_HALF_WIDTH, REPAIR_COUNT, REPAIR_NODES
-from warpspace.scene.model import Scene, evaluate_grid, grid_basis, second_order
+from warpspace.scene.model import Scene, evaluate_grid, grid_basis, second_order, with_placement
 from warpspace.units import Array, spell, spell_short
 
 DEFAULT_LIMIT = 200.0  # µm or µrad by which an error may be changed, unless somebody says otherwise
@@ -101,7 +101,7 @@ class Adjust(Analysis):
     has_chart = True
     makes_scenes = True
     scene_help = "Write the scene with the last set listed applied"
-    loop: Loop | None = option(None, LOOP_HELP, unset="tool; relative with --placed")
+    loop: Loop | None = option(None, LOOP_HELP, unset=LOOP_UNSET)
     placed: bool = option(False, PLACED_HELP)
     objective: Objective = option(
         Objective.RMS,
@@ -131,18 +131,9 @@ class Adjust(Analysis):
         high=REPAIR_NODES[1],
     )
 
-    @property
-    def evaluated_loop(self) -> Loop:
-        return self.loop or (Loop.RELATIVE if self.placed else Loop.TOOL)
-
     def scene_and_view(self, scene: Scene) -> tuple[Scene, View]:
-        if self.placed and self.evaluated_loop is not Loop.RELATIVE:
-            raise OptionError(
-                f"{{placed}}: the {self.loop} loop does not contain the placement of the workpiece;"
-                f" expected loop {Loop.RELATIVE}"
-            )
-        scene = replace(scene, placed=True) if self.placed else scene
-        return scene, scene.view(self.evaluated_loop)
+        scene = with_placement(scene, self.loop, placed=self.placed)
+        return scene, scene.view(self.loop)
 
     def run(self, scene: Scene, watch: ProgressCallback = ignore_progress, /) -> "AdjustResult":
         scene, view = self.scene_and_view(scene)
@@ -158,7 +149,7 @@ class Adjust(Analysis):
             replace(adjusted, exact=Summary(*numbers.four))
             for adjusted, numbers in zip(result.adjustments, exact, strict=True)
         ]
-        left_out = second_order(scene, self.evaluated_loop)
+        left_out = second_order(scene, view.loop)
         result = replace(result, adjustments=tuple(sets), second_order=left_out)
         error = basis.evaluate(values, orientation=False).error_um
         at = nodes.coordinates, view, nodes.point_mm, nodes.weights
@@ -196,6 +187,10 @@ class AdjustResult(Result):
         return self.analysis.objective
 
     @property
+    def view(self) -> View:
+        return self.scene.view(self.analysis.loop)
+
+    @property
     def all_sets_compared(self) -> list[bool]:
         return [adjusted.proven for adjusted in self.adjustments]
 
@@ -213,7 +208,7 @@ class AdjustResult(Result):
         yield " · ".join((self.scene.title, *self._where, smallest))
         mean, rms, p95, largest = (f"{getattr(self.before, name):.2f}" for name in FOUR)
         yield f"  before: mean {mean}, RMS {rms}, P95 {p95}, max {largest} µm"
-        uncertainty = scene_uncertainty(self.scene, self.analysis.evaluated_loop)
+        uncertainty = scene_uncertainty(self.scene, self.view.loop)
         yield from u95_lines(uncertainty, {"": self.before})
         columns = (
             Column("key", leads=True),
@@ -253,8 +248,7 @@ class AdjustResult(Result):
 
     @property
     def _where(self) -> tuple[str, ...]:
-        loop = self.analysis.evaluated_loop
-        return f"{loop} loop", *placed_words(self.scene.view(loop))
+        return f"{self.view.loop} loop", *placed_words(self.view)
 
     @property
     def _objective_words(self) -> str:

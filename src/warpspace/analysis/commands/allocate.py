@@ -282,7 +282,7 @@ def allocate(
         for each in orders
     )
     return AllocateResult(
-        analysis=analysis,
+        analysis=replace(analysis, loop=case.view.loop),
         draws=draws,
         half_width=half_width,
         free=task.free,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import Analysis, ExpandedUncertainty, ProgressCallback, Result
-from warpspace.analysis.options import LOOP_HELP, option
+from warpspace.analysis.options import LOOP_HELP, LOOP_UNSET, option
 from warpspace.analysis.statistics import share_below, share_within
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
 from warpspace.exceptions import OptionError
@@ -38,7 +38,7 @@ class Conformance(Analysis):
     limit_um: float = option(
         40.0, "Largest |E| accepted", unit="µm", low=0.001, high=MAX_ERROR, flag="--limit"
     )
-    loop: Loop = option(Loop.TOOL, LOOP_HELP)
+    loop: Loop | None = option(None, LOOP_HELP, unset=LOOP_UNSET)
     nodes: int = option(21, "Nodes per axis of the working volume", low=2, high=61, flag="--grid")
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "ConformanceResult":
@@ -85,6 +85,7 @@ class Conformance(Analysis):
             expanded_uncertainty=expanded,
             uncertainty=uncertainty and uncertainty.errors,
             title=scene.title,
+            loop=view.loop,
             ranges={axis: ranges[axis] for axis in axes if axis},
         )
 
@@ -100,6 +101,7 @@ class ConformanceResult(Result):
     keeps_um: Mapping[str, float]  # limit by part of the volume
     expanded_uncertainty: ExpandedUncertainty[Any]  # of percent and of these
     title: str
+    loop: Loop
     ranges: Mapping[str, tuple[float, float]]
 
     def blocks(self) -> Iterator[Block]:
@@ -109,7 +111,7 @@ class ConformanceResult(Result):
             else ""
         )
         share = f"{self.percent:.1f}{about} %"
-        yield f"{self.title} · {share} of the volume within {self.limit_um:g} µm"
+        yield f"{self.title} · {self.loop} loop · {share} of the volume within {self.limit_um:g} µm"
         if self.box is None:
             yield "  no box between nodes of the grid is within the limit"
         else:

@@ -167,7 +167,7 @@ class Contributions(Sampled):
         plan.check()
         result = variance_contributions(self.case(scene, plan), self.sobol)
         watch(1.0)
-        where = f"{self.loop} loop · {self.drawn} · RMS |E| {result.rms_um:.1f} µm"
+        where = f"{scene.view(self.loop).loop} loop · {self.drawn} · RMS |E| {result.rms_um:.1f} µm"
         return replace(result, title=scene.title, where=where)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.commands.line import Between
 from warpspace.analysis.description import ExpandedUncertainty, ProgressCallback, Result
-from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
+from warpspace.analysis.options import LOOP_HELP, LOOP_UNSET, Place, option, place_words
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, evaluate_exact, evaluate_first_order
@@ -37,19 +37,20 @@ class Distance(Between):
     task = "understand"
     has_table = True
     corner: Place = option((), "Point whose angle between both edges is measured", unset="no angle")
-    loop: Loop = option(Loop.TOOL, LOOP_HELP)
+    loop: Loop | None = option(None, LOOP_HELP, unset=LOOP_UNSET)
     placed: bool = option(False, "Fit out the placement of the workpiece; relative loop only")
     exact: bool = option(False, "The exact chain instead of the first order")
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "DistanceResult":
         scene = with_placement(scene, self.loop, placed=self.placed)
+        view = scene.view(self.loop)
         at = self.places(scene, self.corner)
         point = nominal_point(scene.model, Loop.TOOL, at)  # in any loop, as over the grid
         solve = evaluate_exact if self.exact else evaluate_first_order
-        field = solve(scene.model, scene.errors, at, scene.view(self.loop), point)
+        field = solve(scene.model, scene.errors, at, view, point)
         watch(1.0)
         result = self.between(scene, at, field)
-        uncertainty = field_uncertainty(scene, field.error_um, at, scene.view(self.loop), point)
+        uncertainty = field_uncertainty(scene, field.error_um, at, view, point)
         if uncertainty is None:
             return result
 
@@ -85,7 +86,7 @@ class Distance(Between):
             angle_deg=None if angle is None else np.rad2deg(angle),
             deviation_urad=None if angle is None else float(angle[1] - angle[0]) * URAD_PER_RAD,
             is_squareness=angle is not None and bool(abs(angle[0] - np.pi / 2.0) < RIGHT_RAD),
-            title=f"{scene.title} · {self.loop} loop",
+            title=f"{scene.title} · {scene.view(self.loop).loop} loop",
         )
 
 

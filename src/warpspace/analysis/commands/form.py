@@ -15,7 +15,7 @@ from warpspace.analysis.description import (
     Result,
     count_progress,
 )
-from warpspace.analysis.options import LOOP_HELP, option
+from warpspace.analysis.options import LOOP_HELP, LOOP_UNSET, option
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import Grid, build_grid
@@ -60,7 +60,7 @@ class Form(Analysis):
     task = "understand"
     has_table = True
     nodes: int = option(11, "Nodes per axis of the working volume", low=3, high=41, flag="--grid")
-    loop: Loop = option(Loop.TOOL, LOOP_HELP)
+    loop: Loop | None = option(None, LOOP_HELP, unset=LOOP_UNSET)
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "FormResult":
         grid = build_grid(scene.model, scene.workspace, self.nodes)
@@ -76,7 +76,7 @@ class Form(Analysis):
         advance = count_progress(watch, n_evaluations)
         advance(1)
         if uncertainty is None:
-            return FormResult(deviations=deviations, title=scene.title)
+            return FormResult(deviations=deviations, title=scene.title, loop=view.loop)
 
         def deviation_values(error_um: Array) -> Array:
             advance(1)
@@ -87,7 +87,12 @@ class Form(Analysis):
             replace(deviation, expanded_uncertainty=ExpandedUncertainty(u95=expanded))
             for deviation, expanded in zip(deviations, u95, strict=True)
         )
-        return FormResult(deviations=deviations, title=scene.title, uncertainty=uncertainty.errors)
+        return FormResult(
+            deviations=deviations,
+            title=scene.title,
+            loop=view.loop,
+            uncertainty=uncertainty.errors,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,9 +102,10 @@ class FormResult(Result):
     json_keys = ("deviations",)
     deviations: tuple[FormDeviation, ...]
     title: str
+    loop: Loop
 
     def blocks(self) -> Iterator[Block]:
-        yield f"{self.title} · form of the distorted volume"
+        yield f"{self.title} · {self.loop} loop · form of the distorted volume"
         columns = (
             *(Column(name, key=name, leads=name != "at") for name in ("kind", "of", "at")),
             Column("value", ".2f", key="value"),

@@ -12,7 +12,15 @@ from numpy.typing import ArrayLike
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
 from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.loop_parameters import loop_keys
-from warpspace.analysis.options import AT_HELP, LOOP_HELP, Place, error_words, option, place_words
+from warpspace.analysis.options import (
+    AT_HELP,
+    LOOP_HELP,
+    LOOP_UNSET,
+    Place,
+    error_words,
+    option,
+    place_words,
+)
 from warpspace.analysis.publications import PUBLICATIONS
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
@@ -249,7 +257,7 @@ class Gains(Analysis):
     task = "understand"
     has_chart = True
     has_table = True
-    loop: Loop = option(Loop.TOOL, LOOP_HELP)
+    loop: Loop | None = option(None, LOOP_HELP, unset=LOOP_UNSET)
     at: Place = option((), AT_HELP, unset="the middle of the scene's ranges")
     over_travel: bool = option(
         False,
@@ -274,14 +282,14 @@ class Gains(Analysis):
             raise OptionError("{at}: expected one point, and none with {over_travel}")
         if self.step_deg is not None and not self.over_travel:
             raise OptionError("{step_deg} belongs to {over_travel}")
-        keys = scene.parameter_keys
+        keys, loop = scene.parameter_keys, scene.view(self.loop).loop
         if self.over_travel:
             travel = {name: axis.travel for name, axis in scene.machine.axes.items()}
-            gains = gains_max(scene.model, self.loop, keys, travel, self.step_deg, self.share)
+            gains = gains_max(scene.model, loop, keys, travel, self.step_deg, self.share)
         else:
             place = {**scene.workspace.positions, **dict(self.at)}
-            gains = gains_at(scene.model, self.loop, keys, place, self.share)
-        return GainsResult(gains=gains, analysis=self, machine=scene.machine)
+            gains = gains_at(scene.model, loop, keys, place, self.share)
+        return GainsResult(gains=gains, analysis=replace(self, loop=loop), machine=scene.machine)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
 from warpspace.analysis.description import Analysis, ExpandedUncertainty, ProgressCallback, Result
-from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
+from warpspace.analysis.options import LOOP_HELP, LOOP_UNSET, Place, option, place_words
 from warpspace.analysis.uncertainty.propagation import plus_minus, scene_uncertainty, u95_columns
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
@@ -62,14 +62,15 @@ class Line(Between):
     has_chart = True
     has_table = True
     points: int = option(101, "Points along it", low=2, high=10_001)
-    loop: Loop = option(Loop.TOOL, LOOP_HELP)
+    loop: Loop | None = option(None, LOOP_HELP, unset=LOOP_UNSET)
     exact: bool = option(False, "The exact chain instead of the first order")
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "LineResult":
         share = np.linspace(0.0, 1.0, self.points)
         ends = self.places(scene).items()
         axes = {name: low + (high - low) * share for name, (low, high) in ends}
-        field = evaluate(scene, at=axes, loop=self.loop, exact=self.exact)
+        view = scene.view(self.loop)
+        field = evaluate(scene, at=axes, loop=view.loop, exact=self.exact)
         watch(1.0)
         on_workpiece = np.broadcast_to(relative_point(scene.model, axes), (self.points, 3))
         steps = np.linalg.norm(np.diff(on_workpiece, axis=0), axis=1)
@@ -81,9 +82,9 @@ class Line(Between):
             nominal_mm=field.nominal_mm,
             error_um=field.error_um,
             orientation_urad=field.orientation_urad,
-            title=f"{scene.title} · {self.loop} loop",
-            uncertainty=scene_uncertainty(scene, self.loop),
-            expanded_uncertainty=u95_columns(scene, field, axes, scene.view(self.loop)),
+            title=f"{scene.title} · {view.loop} loop",
+            uncertainty=scene_uncertainty(scene, view.loop),
+            expanded_uncertainty=u95_columns(scene, field, axes, view),
         )
 
 

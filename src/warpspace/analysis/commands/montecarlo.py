@@ -291,7 +291,7 @@ class MonteCarloResult(Result):
         analysis, first = self.analysis, self.points[0].sampled
         if analysis.in_rows:
             yield (
-                f"{analysis.loop} loop · {analysis.samples:,} machines a row, {analysis.over} ·"
+                f"{first.view.loop} loop · {analysis.samples:,} machines a row, {analysis.over} ·"
                 f" {first.draws.distribution} · seed {analysis.seed}"
             )
         else:
@@ -331,7 +331,7 @@ class MonteCarloResult(Result):
         printed: dict[str, PrintedNumber] = {}
         if analysis.over is Reduction.SAMPLED:
             for publication in PUBLICATIONS.members():
-                number = publication.sampled_mean(scene, analysis.loop)
+                number = publication.sampled_mean(scene, sampled.view.loop)
                 if number is not None:
                     printed[publication.name] = number
             variance, offset = expected_square(case_of(scene, sampled))
@@ -363,7 +363,7 @@ class MonteCarloResult(Result):
         if drawn == "normal":
             drawn = "normal, 3σ = half width" + (", clipped" if sampled.draws.clip else "")
         return (
-            f"{analysis.loop} loop · {analysis.samples:,} machines, {WHAT[analysis.over]}"
+            f"{sampled.view.loop} loop · {analysis.samples:,} machines, {WHAT[analysis.over]}"
             f" · {drawn} · seed {analysis.seed}"
         )
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import Analysis, ProgressCallback, Result
-from warpspace.analysis.options import LOOP_HELP, option, place_words
+from warpspace.analysis.options import LOOP_HELP, LOOP_UNSET, option, place_words
 from warpspace.analysis.statistics import P95, Statistics, volume_statistics
 from warpspace.analysis.uncertainty.propagation import (
     COVERAGE,
@@ -49,7 +49,7 @@ class Uncertainty(Analysis):
         unset="that of the scene",
     )  # fmt: skip
     verify: bool = option(False, "Monte Carlo beside the linear propagation")
-    loop: Loop = option(Loop.TOOL, LOOP_HELP)
+    loop: Loop | None = option(None, LOOP_HELP, unset=LOOP_UNSET)
     nodes: int = option(11, "Nodes per axis of the working volume", low=2, high=21, flag="--grid")
     samples: int = option(10_000, "Number of machines drawn", low=100, high=1_000_000)
     seed: int = option(0, "Seed of the random numbers", low=0, high=2**63 - 1)
@@ -70,7 +70,7 @@ class Uncertainty(Analysis):
             k=uncertainty and uncertainty.errors.factor,
             unknown=uncertainty.errors.unknown if uncertainty else [*scene.errors],
             remarks=tuple(uncertainty.errors.remarks()) if uncertainty else (NOT_STATED,),
-            title=f"{scene.title} · {self.loop} loop",
+            title=f"{scene.title} · {view.loop} loop",
         )
         if uncertainty is None or not uncertainty.errors.is_known:
             return result

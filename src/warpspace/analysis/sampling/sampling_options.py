@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from warpspace.analysis.description import Analysis
 from warpspace.analysis.loop_parameters import loop_keys
-from warpspace.analysis.options import LOOP_HELP, Grammar, option
+from warpspace.analysis.options import LOOP_HELP, LOOP_UNSET, Grammar, option
 from warpspace.analysis.sampling.cases import (
     DEFAULT_NODES,
     DEFAULT_SAMPLES,
@@ -38,7 +38,7 @@ def scene_draws(scene: Scene, loop: Loop, distribution: Distribution | str, *, c
 class Sampled(Analysis):
     """An analysis of machines within tolerance."""
 
-    loop: Loop = option(Loop.TOOL, LOOP_HELP)
+    loop: Loop | None = option(None, LOOP_HELP, unset=LOOP_UNSET)
     distribution: Distribution | None = option(
         None,
         "uniform over the tolerance, or normal with 3σ = half width",
@@ -64,7 +64,7 @@ class Sampled(Analysis):
         return self.distribution or Distribution.UNIFORM
 
     def draws(self, scene: Scene) -> Draws:
-        return scene_draws(scene, self.loop, self.drawn, clip=self.clip)
+        return scene_draws(scene, scene.view(self.loop).loop, self.drawn, clip=self.clip)
 
     def case(self, scene: Scene, plan: SamplingPlan) -> Case:
         return Case(scene.model, self.draws(scene), scene.workspace, scene.view(self.loop), plan)

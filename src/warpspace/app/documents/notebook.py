@@ -37,7 +37,7 @@ class SceneView:
 def show(
     scene: Scene,
     *,
-    loop: Loop | str = Loop.TOOL,
+    loop: Loop | str | None = None,
     grid: int = DEFAULT_NODES,
     exaggeration: Exaggeration = None,
     component: str = "norm",

@@ -124,7 +124,7 @@ def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
 @grid_option(11, "of the predicted map, with --against")
 @json_option
 def check(
-    scenes: tuple[str, ...], against: str | None, loop: str, grid: int, *, as_json: bool
+    scenes: tuple[str, ...], against: str | None, loop: str | None, grid: int, *, as_json: bool
 ) -> None:
     """Validate SCENE and summarise its content.
 

@@ -247,6 +247,7 @@ def compare(
     scenes = [
         load_placed(name, direction, settings.loop, placed=placed) for name in (first, second)
     ]
+    settings = settings.for_scenes(scenes)
     with progress("evaluating", silent=as_json):
         pictures = [evaluate_picture(s, grid=settings.grid, loop=settings.loop) for s in scenes]
     compared = [*pictures, scene_change(pictures[0], pictures[1])]
@@ -292,7 +293,7 @@ def compare(
 def export(
     scene: str,
     output: str,
-    loop: str,
+    loop: str | None,
     direction: str | None,
     *,
     force: bool,

@@ -13,13 +13,14 @@ from typing import Any, Final
 from warpspace.analysis.commands.concepts import Concepts
 from warpspace.exceptions import OptionError
 from warpspace.geometry.colour import COMPONENTS
+from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import MAX_FIGURE_AREA_PX as LARGEST_AREA
 from warpspace.machine.limits import MAX_FIGURE_SIDE_PX as LARGEST_SIDE
 from warpspace.machine.limits import MIN_FIGURE_PX as SMALLEST_SIZE
 from warpspace.machine.limits import RANGE_TOP
 from warpspace.picture import model
 from warpspace.picture.formatting import range_words
-from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, common_loop
 
 REFERENCE_SIZE: Final = (1600, 1200)
 FONT: Final = "DejaVu Sans"
@@ -104,7 +105,7 @@ class FigureSettings:
     # px; width and height; vector formats take 100 px for an inch
     size: tuple[int, int] = (1600, 1200)
     dark: bool = False  # light ink on a dark ground
-    loop: str = "tool"  # "tool", "workpiece" or "relative"
+    loop: str | None = None  # "tool", "workpiece" or "relative"; None for that of the scene
     grid: int = 21  # nodes per axis of the working volume
     # µm or µrad; end of the colour range (of a signed component also its negative start); None for
     # a round value above the whole map
@@ -134,6 +135,14 @@ class FigureSettings:
     @property
     def theme(self) -> Theme:
         return DARK if self.dark else LIGHT
+
+    @property
+    def chosen_loop(self) -> Loop | None:
+        return Loop(self.loop) if self.loop else None
+
+    def for_scenes(self, scenes: Sequence[Scene]) -> "FigureSettings":
+        """Return the settings with the loop in which all scenes are drawn."""
+        return replace(self, loop=common_loop(scenes, self.loop))
 
 
 def check_size(size: tuple[int, int]) -> None:

@@ -25,7 +25,7 @@ from warpspace.picture.formatting import (
 )
 from warpspace.picture.model import Picture, ScenePicture
 from warpspace.resources import __version__
-from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, common_loop
 from warpspace.units import MM_PER_UM, spell_short
 
 
@@ -338,7 +338,7 @@ def metadata(
     options = {
         "component": settings.component,
         "view": settings.view,
-        "loop": settings.loop,
+        "loop": common_loop(scenes, settings.loop),
         "grid": settings.grid,
         "exaggeration": factor,
         "size": f"{settings.size[0]}x{settings.size[1]}",

@@ -143,7 +143,7 @@ def to_pyvista(
     scene: Scene,
     *,
     grid: int = DEFAULT_NODES,
-    loop: Loop | str = Loop.TOOL,
+    loop: Loop | str | None = None,
     exaggeration: Exaggeration = "auto",
     parts: bool = False,
 ) -> "pv.MultiBlock":

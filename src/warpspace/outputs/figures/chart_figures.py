@@ -16,7 +16,6 @@ from warpspace.bench.base import run_test
 from warpspace.bench.kinds.circular import Circular
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import placed_words
-from warpspace.kinematics.model import Loop
 from warpspace.outputs.charts.block_charts import (
     bars_chart,
     charts_sheet,
@@ -34,7 +33,7 @@ from warpspace.units import spell_count
 
 def draw_gains(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     scene = scenes[0]
-    bars = Gains(loop=Loop(settings.loop), over_travel=True).run(scene, ignore_progress).bars()
+    bars = Gains(loop=settings.chosen_loop, over_travel=True).run(scene, ignore_progress).bars()
     title = f"Error gains: {scene.machine.title}"
     subtitle = f"{_loop(scene, settings)} · largest absolute gains over the travel"
     chart = replace(bars, title=title, subtitle=subtitle)
@@ -43,7 +42,7 @@ def draw_gains(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool
 
 def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     scene = scenes[0]
-    sampled = montecarlo(MonteCarlo(loop=Loop(settings.loop)).case(scene, SamplingPlan()))
+    sampled = montecarlo(MonteCarlo(loop=settings.chosen_loop).case(scene, SamplingPlan()))
     title = f"Machines within tolerance: {scene.title}"
     loop = " · ".join((_loop(scene, settings), *placed_words(sampled.view)))
     subtitle = (

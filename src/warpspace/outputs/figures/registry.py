@@ -69,4 +69,4 @@ def draw_figure(
         if max_scenes == kind.scenes:
             expected = "one scene" if kind.scenes == 1 else "two scenes"
         raise OptionError(f"figure {name!r} is drawn from {expected}; given {len(scenes)}")
-    return kind.load()(scenes, settings or FigureSettings(), exact=exact)
+    return kind.load()(scenes, (settings or FigureSettings()).for_scenes(scenes), exact=exact)

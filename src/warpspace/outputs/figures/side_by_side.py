@@ -9,7 +9,6 @@ import numpy as np
 from warpspace.analysis.commands.adjust import Adjust, AdjustResult
 from warpspace.analysis.commands.concepts import LETTERS, Concept, compare_concepts
 from warpspace.bodies.placed import PlacedBody, place_bodies
-from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
 from warpspace.outputs.drawing.canvas import Canvas
@@ -39,7 +38,7 @@ from warpspace.picture.comparison import (
 )
 from warpspace.picture.formatting import LOOP_WORDS, tolerance_words
 from warpspace.picture.model import ScenePicture, picture_concept, view_words
-from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, common_loop
 from warpspace.units import Array, spell, spell_count, spell_short, spell_signed
 
 
@@ -126,7 +125,7 @@ def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
 
 def draw_adjustment(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     scene = scenes[0]
-    adjustment = Adjust(loop=Loop(settings.loop), grid=min(settings.grid, REPAIR_NODES[1])).run(
+    adjustment = Adjust(loop=settings.chosen_loop, grid=min(settings.grid, REPAIR_NODES[1])).run(
         scene
     )
     after = adjustment.changes()[-1].scene if adjustment.adjustments else scene
@@ -154,7 +153,7 @@ CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0
 
 
 def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    plan = replace(settings.concepts, loop=Loop(settings.loop))
+    plan = replace(settings.concepts, loop=common_loop(scenes, settings.loop))
     concepts = compare_concepts(scenes, plan)
     pictures = share_colours(
         replace(settings, component="norm"),

@@ -25,7 +25,7 @@ from warpspace.outputs.report.templating import Block, Cards, Items, Text
 from warpspace.picture.comparison import scene_change, share_exaggeration
 from warpspace.picture.formatting import TIMES, list_axes, point_axes, spell_in_r, u95_behind
 from warpspace.picture.model import Exaggeration, ScenePicture, evaluate_picture, same_nodes
-from warpspace.scene.model import Scene, second_order
+from warpspace.scene.model import Scene, common_loop, second_order
 from warpspace.units import spell, spell_short, spell_signed
 
 UM, PERCENT = "\N{NO-BREAK SPACE}µm", "\N{NO-BREAK SPACE}%"
@@ -36,7 +36,7 @@ _WORTH = 0.01  # least reduction of the largest error, as a share, by a recommen
 class ReportSettings:
     """Choices of a report."""
 
-    loop: str = "tool"  # "tool", "workpiece" or "relative"
+    loop: str | None = None  # "tool", "workpiece" or "relative"; None for that of the scenes
     grid: int = 21  # nodes per axis of the working volume
     # "auto" or None; display factor; None takes the first scene's
     exaggeration: Exaggeration = None
@@ -48,7 +48,7 @@ class ReportSettings:
     questions: tuple[str, ...] = ()  # open questions, on the first page
 
     def analyses(self, limit_um: float | None) -> dict[str, Analysis]:
-        loop, seed = Loop(self.loop), self.seed
+        loop, seed = Loop(self.loop) if self.loop else None, self.seed
         drawn = choose_distribution(self.distribution)
 
         def machines(statistic: Reduction) -> MonteCarlo:
@@ -150,7 +150,10 @@ def share_pictures(scenes: Sequence[Scene], settings: ReportSettings) -> tuple[S
     if settings.spec_um is not None:
         scenes = [replace(scene, limit_um=settings.spec_um) for scene in scenes]
     return share_exaggeration(
-        [evaluate_picture(scene, grid=settings.grid, loop=settings.loop) for scene in scenes],
+        [
+            evaluate_picture(scene, grid=settings.grid, loop=common_loop(scenes, settings.loop))
+            for scene in scenes
+        ],
         settings.exaggeration,
     )
 
@@ -182,7 +185,7 @@ def _review_scene(letter: str, picture: ScenePicture, settings: ReportSettings) 
         letter,
         picture,
         explain(scene.model, scene.errors, at, picture.view, point),
-        second_order(scene, settings.loop).um,
+        second_order(scene, picture.view.loop).um,
         results,
         _share_within(picture),
         _advice(picture, results["advice"], settings),

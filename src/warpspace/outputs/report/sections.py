@@ -58,7 +58,7 @@ from warpspace.picture.formatting import (
 from warpspace.picture.model import ScenePicture
 from warpspace.picture.traces import trace_lines
 from warpspace.resources import __version__
-from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, common_loop
 from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.scene.text_files import read_bytes
 from warpspace.units import spell, spell_short, spell_signed
@@ -83,7 +83,7 @@ class ReportFigures:
         self,
         worker: FigureWorker,
         pictures: Sequence[ScenePicture],
-        loop: str,
+        loop: str | None,
         grid: int,
         form: str,
         watch: ProgressCallback = ignore_progress,
@@ -208,6 +208,7 @@ def build_report(
     if form not in ("svg", "pdf"):
         raise OptionError(f"figures of a report as {form!r}; expected svg or pdf")
     settings = settings or ReportSettings()
+    settings = replace(settings, loop=common_loop(scenes, settings.loop))
     pictures = share_pictures(scenes, settings)
     with FigureWorker() as worker:
         figures = ReportFigures(worker, pictures, settings.loop, settings.grid, form, watch)
@@ -484,7 +485,7 @@ def conventions(review: Review) -> Items:
         for one, words in zip(review.scenes, each if differ else each[:1], strict=False)
         for text in words
     ]
-    loop = review.settings.loop
+    loop = review.scenes[0].picture.view.loop
     return Items(
         (
             "Error = actual − nominal. Lengths in mm, errors in µm, small angles in µrad.",
