@@ -263,7 +263,5 @@ def with_errors(machine: PhysicalMachine, errors: Mapping[str, object]) -> Physi
                 tables[key[1]] = value
         return replace(body, constants=constants, tables=tables)
 
-    workpiece, tool = (
-        tuple(map(bent, bodies)) for bodies in (machine.workpiece, machine.tool)
-    )
+    workpiece, tool = (tuple(map(bent, bodies)) for bodies in (machine.workpiece, machine.tool))
     return replace(machine, workpiece=workpiece, tool=tool)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from warpspace.bench.base import find_test
-from warpspace.bench.placing import ball_point
 from warpspace.bench.plan import simulate
 from warpspace.calibration import Calibrate, calibrate, read_readings
 from warpspace.calibration.calibration_result import Estimability
@@ -17,6 +16,7 @@ from warpspace.calibration.readings import Readings, find_data, parse_reading_ta
 from warpspace.calibration.solve import build_fit_parameters, describe_rank, solve
 from warpspace.calibration.spheres import circles_of
 from warpspace.field.evaluate import evaluate_exact
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.errors import Constant, ErrorSet, Ramp
 from warpspace.scene.library import load_scene
 
@@ -121,7 +121,7 @@ def planted(errors, kind, poses, noise=0.0, seed=0):
     }
     error = evaluate_exact(FORK.model, ErrorSet(functions), coordinates, VIEW).error_um * 1e-3
     error = error + noise * np.random.default_rng(seed).standard_normal(error.shape)
-    tip = ball_point(FORK.model, coordinates)
+    tip = relative_point(FORK.model, coordinates)
     place = np.array([1.0, -2.0, 3.0])
     observed = error if kind == "points" else tip.mean(axis=0) + place - error
     if kind == "lengths":
@@ -219,7 +219,7 @@ def test_told_combinations_hold_in_95_percent_of_trials(trials, near):
     poses = {axis: corner.ravel() for axis, corner in zip("XYZ", corners, strict=True)}
     poses |= {axis: np.full(27, scene.workspace.positions[axis]) for axis in "BC"}
     curves = {key: (Constant if key[2] == "0" else Ramp)(scene.axis_span(key[-1])) for key in keys}
-    tip, held = ball_point(scene.model, poses), []
+    tip, held = relative_point(scene.model, poses), []
     for seed in range(trials):
         draw = np.random.default_rng(seed)
         truth = ErrorSet(

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, volume_uncertainty
-from warpspace.bench.placing import ball_point
 from warpspace.calibration import Calibrate, calibrate
 from warpspace.calibration.instruments import instrument_names, load_instrument
 from warpspace.calibration.kinds import VIEW
@@ -18,6 +17,7 @@ from warpspace.calibration.solve import build_fit_parameters
 from warpspace.exceptions import SceneError, UnknownNameError
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.kinematics.model import complete_coordinates
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import evaluate
 
@@ -112,7 +112,7 @@ def own(tmp_path):
 def vectors(scene, poses, error_um, session=""):
     count = len(error_um)
     at = {axis: np.asarray(poses.get(axis, np.zeros(count))) for axis in scene.machine.axes}
-    tip, lines = ball_point(scene.model, at), tuple(range(count))
+    tip, lines = relative_point(scene.model, at), tuple(range(count))
     return Readings("points", at, tip, 1e-3 * error_um, None, (session,) * count, lines, "r.csv")
 
 

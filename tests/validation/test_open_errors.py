@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from warpspace.analysis.uncertainty.propagation import scene_uncertainty, volume_uncertainty
-from warpspace.bench.placing import ball_point
 from warpspace.calibration import Calibrate, calibrate
 from warpspace.calibration.readings import Readings
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.errors import Constant
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.scene_writer import scene_to_toml
@@ -29,7 +29,7 @@ SCENE = parse_scene(MACHINE, "s")
 def vectors(scene, poses, error_um, session=""):
     count = len(error_um)
     at = {axis: np.asarray(poses.get(axis, np.zeros(count))) for axis in scene.machine.axes}
-    tip, lines = ball_point(scene.model, at), tuple(range(count))
+    tip, lines = relative_point(scene.model, at), tuple(range(count))
     return Readings("points", at, tip, 1e-3 * error_um, None, (session,) * count, lines, "r.csv")
 
 

@@ -10,9 +10,9 @@ from scipy.optimize import least_squares
 from bench_scenes import scene_with
 from warpspace import load_scene
 from warpspace.bench.kinds.ball_plate import BallPlate, plate_residuals
-from warpspace.bench.placing import ball_point
 from warpspace.bench.plan import simulate
 from warpspace.exceptions import SceneError
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.parts.inspection import (
     FeatureShape,
     features_table,
@@ -262,7 +262,7 @@ def test_a_plate_of_holes_is_the_ball_plate_of_the_bench():
     test = BallPlate(balls=3, pitch_mm=60.0, positions=1)
     plan = test.plan(scene)
     sites = {name: np.broadcast_to(at, 9) for name, at in plan.coordinates.items()}
-    made = evaluate_points(scene, ball_point(scene.model, sites))
+    made = evaluate_points(scene, relative_point(scene.model, sites))
     balls = plate_residuals(plan, simulate(scene, plan, exact=False))
     assert np.abs(subtract_best_fit(made.point_mm, made.error_um) - balls).max() < 1e-6
 

@@ -35,8 +35,8 @@ from warpspace.units import Array
 
 NODES = 28  # per axis, for the residual error: they lie between the points of usual tables
 SMALL_NODES = 7  # nodes and points per axis with which the placement of a workpiece is fitted
-STEP = 100.0  # µm and µrad; change of a placement that measures the response of a table
-ROUNDING = 1e-4  # of the response of a table, by which its text is rounded
+STEP = 1000.0  # µm and µrad; change of a placement that measures the response of a table
+ROUNDING = 5e-3  # error of the response of a table, whose numbers are rounded
 PLACED_ASSUMPTION = (
     "best-fit placement: three shifts and three small rotations of the workpiece are fitted out"
     " of the errors before and after"
@@ -169,6 +169,8 @@ class Compensation(BeforeAfter, Result):
     directions: Mapping[str, BeforeAfter] = field(default_factory=dict[str, BeforeAfter])
     reversal: tuple[str, ...] = ()  # notes on reversal errors that the format cannot represent
     resolution: float = 0.0  # mm or degrees; 0 where the format sets it
+    # with the placement of the workpiece, where it is fitted out of the errors
+    unplaced: BeforeAfter | None = None
 
     @property
     def size(self) -> int:
@@ -250,12 +252,9 @@ class Compensation(BeforeAfter, Result):
                 for name, field in (("before", self.before), ("after", self.after))
             },
             "directions": {
-                direction: {
-                    "before": to_json(errors.before_statistics),
-                    "after": to_json(errors.after_statistics),
-                }
-                for direction, errors in self.directions.items()
+                direction: errors.as_statistics() for direction, errors in self.directions.items()
             },
+            "unplaced": self.unplaced and self.unplaced.as_statistics(),
             "assumed": list(self.assumed),
             "notes": list(self.notes),
         }
@@ -268,7 +267,8 @@ class Compensation(BeforeAfter, Result):
             *number_columns(("mean tilt", "max tilt"), ".2f", "µrad"),
         )
         rows: list[tuple[str | float, ...]] = []
-        for direction, errors in {"": self, **self.directions}.items():
+        unplaced = {"without placement fit": self.unplaced} if self.unplaced else {}
+        for direction, errors in {"": self, **unplaced, **self.directions}.items():
             before, after = errors.before_statistics.four, errors.after_statistics.four
             rows += [
                 (f"before {direction}".rstrip(), *before, *errors.tilt_urad(errors.before)),
@@ -348,11 +348,17 @@ def compensate(
     check_cancelled()
     comparison = evaluate_before_after(controller, grid, scene.model.direction)
     check_cancelled()
+    unplaced: BeforeAfter | None = None
+    fixed = controller
+    if scene.view(controller.loop).placed_over is not None:
+        fixed = replace(controller, scene=replace(scene, placed=False))
+        unplaced = evaluate_before_after(fixed, grid, scene.model.direction)
+        check_cancelled()
     directions: dict[str, BeforeAfter] = {}
     reversal: tuple[str, ...] = ()
     if scene.errors.has_directions:
         forward, backward = (
-            evaluate_before_after(controller, grid, direction)
+            evaluate_before_after(fixed, grid, direction)  # one placement for both
             for direction in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
         )
         directions = {"forward": forward, "backward": backward}
@@ -360,7 +366,7 @@ def compensate(
         check_cancelled()
     return Compensation(
         comparison.before, comparison.after, grid, comparison.field_uncertainty, kind, files,
-        points, controller, directions, reversal, options.resolution,
+        points, controller, directions, reversal, options.resolution, unplaced,
     )  # fmt: skip
 
 

@@ -1,9 +1,11 @@
 """A controller with a compensation table: its corrections and the residual error."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from warpspace.analysis.description import to_json
 from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.analysis.uncertainty.propagation import FieldUncertainty, field_uncertainty
 from warpspace.exceptions import OptionError
@@ -222,6 +224,9 @@ class BeforeAfter:
             return statistics
         uncertainty = replace(self.field_uncertainty, error_um=field.error_um)
         return uncertainty.with_expanded_uncertainty(statistics)
+
+    def as_statistics(self) -> dict[str, Any]:
+        return {"before": to_json(self.before_statistics), "after": to_json(self.after_statistics)}
 
     def tilt_urad(self, field: ErrorField) -> tuple[float, float]:
         """Return the volume mean and the maximum of the tilt of the tool axis, µrad."""
