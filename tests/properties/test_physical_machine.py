@@ -1,0 +1,232 @@
+"""Readings, tables and loops mean on every machine what a simulated one of rigid bodies does."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from physical_machine import LINEAR, PhysicalMachine, machines, placed_um, with_errors
+from warpspace.analysis.commands.distance import Distance
+from warpspace.analysis.commands.form import Form
+from warpspace.analysis.commands.line import Line
+from warpspace.bench.base import run_test
+from warpspace.bench.data import parse_table
+from warpspace.bench.kinds.positioning import Positioning
+from warpspace.bench.kinds.straightness import Squareness, Straightness
+from warpspace.formats.compensation.compensate import Compensate
+from warpspace.formats.registry import ReadOptions, read_errors
+from warpspace.formats.source import source_of_text
+from warpspace.formats.to_scene import build_imported_scene
+from warpspace.kinematics.relative_motion import angle_error
+from warpspace.scene.library import parse_scene
+from warpspace.scene.model import evaluate
+
+LEAST = 20  # chains of each test
+CHAINS = settings(max_examples=max(LEAST, settings.default.max_examples))
+PAIRS = ("XY", "XZ", "YZ")
+ROUNDING = {"abs": 0.05, "rel": 1e-3}  # µm and µrad; and of the first order
+MICRO = st.integers(-40, 40).map(float)
+
+
+def ignore(_share: float) -> None:
+    pass
+
+
+@st.composite
+def bent_machines(draw: st.DrawFn, *, rotary: int = 0) -> PhysicalMachine:
+    """Machines with up to four errors of any kind, anywhere."""
+    machine = draw(machines(rotary=rotary))
+    keys = [
+        f"E{letter}{middle}{body.name}"
+        for letter in "XYZABC"
+        for middle in ("", "0")
+        for body in machine.bodies
+    ]
+    errors: dict[str, object] = {}
+    for key in draw(st.lists(st.sampled_from(keys), min_size=1, max_size=4, unique=True)):
+        low, high = machine.workspace[key.lstrip("E")[1:].lstrip("0")]
+        middle = (low + high) / 2.0 + (0.0 if low < high else 0.5)
+        table = ((low, draw(MICRO)), (middle, draw(MICRO)), (max(high, low + 1.0), draw(MICRO)))
+        errors[key] = draw(MICRO) if "0" in key else table
+    return with_errors(machine, errors)
+
+
+def scene_of(machine):
+    return parse_scene(machine.scene_text(), "simulated")
+
+
+@CHAINS
+@given(bent_machines(rotary=2))
+def test_fields_are_those_of_rigid_bodies(machine):
+    scene = scene_of(machine)
+    for q in machine.nodes(2):
+        field = evaluate(scene, at=q, exact=True, frame="workpiece", loop="relative")
+        assert field.error_um == pytest.approx(machine.error_um(q), **ROUNDING)
+
+
+@CHAINS
+@given(bent_machines(rotary=1))
+def test_instruments_read_along_programmed_directions(machine):
+    scene = scene_of(machine)
+    for axis in LINEAR:
+        run = run_test(scene, Positioning(axis=axis)).model
+        targets = run.plan.marks["target"]
+        read = run.readings - run.readings[0]
+        assert read == pytest.approx(machine.positioning_um(axis, targets), **ROUNDING)
+        sensed = LINEAR[(LINEAR.index(axis) + 1) % 3]
+        run = run_test(scene, Straightness(axis=axis, across=sensed.lower())).model
+        places = run.plan.marks["position_mm"]
+        read = run.readings - run.readings[0]
+        assert read == pytest.approx(machine.across_um(axis, sensed, places), **ROUNDING)
+    for first, second in PAIRS:
+        outcome = run_test(scene, Squareness(plane=first + second)).model.outcome
+        _, change = angle_error(scene.machine, first, second)
+        angle = machine.squareness_urad(first, second)
+        assert outcome["end_points_urad"] * change == pytest.approx(angle, abs=0.2, rel=1e-3)
+
+
+@CHAINS
+@given(bent_machines(), st.sampled_from(LINEAR))
+def test_measured_readings_are_evaluated_along_programmed_directions(machine, axis):
+    targets = np.linspace(*machine.workspace[axis], 5)
+    deviations = machine.positioning_um(axis, targets)
+    rows = [
+        f"{run},{sign},{at:.6f},{um:.9f}"
+        for run in (1, 2)
+        for sign in "+-"
+        for at, um in zip(targets, deviations, strict=True)
+    ]
+    text = "run,direction,target_mm,deviation_um\n" + "\n".join(rows)
+    test, scene = Positioning(axis=axis), scene_of(machine)
+    table = parse_table(text, test.data_columns(scene), "runs.csv")
+    result = run_test(scene, test, table)
+    assert result.measured.outcome["M_um"] == pytest.approx(np.ptp(deviations), abs=1e-6)
+    assert result.rms_difference == pytest.approx(0.0, abs=0.05)
+
+
+def imported(machine, text, name, kind):
+    base = parse_scene(machine.scene_text(errors=False), "nominal")
+    source = source_of_text(text, name)
+    reading = read_errors([source], ReadOptions(base.machine, axis=""), kind)
+    return build_imported_scene(reading, base, "", name).scene
+
+
+RTL = """HEADER::
+File type  : rtl
+
+TARGET DATA::
+Filetype  : ISO
+Target-count: {count}
+Targets :
+{targets}
+Flags: 0 1 2 0
+
+USER-TEXT::
+Axis:{axis}
+
+RUNS::
+Run-count:1
+
+DEVIATIONS::
+Run Target Data:
+{rows}
+
+EOF::
+"""
+
+
+@CHAINS
+@given(machines(), st.sampled_from(LINEAR), st.lists(MICRO, min_size=4, max_size=4))
+def test_deviations_of_a_laser_are_read_along_the_axis(machine, axis, deviations):
+    targets = np.round(np.linspace(*machine.workspace[axis], 4), 3)
+    rows = "\n".join(f"1 {number} {um}" for number, um in enumerate(deviations, 1))
+    shown = " ".join(f"{at:.3f}" for at in targets)
+    rtl = RTL.format(count=4, targets=shown, axis=axis, rows=rows)
+    table = f"{axis} [mm],E{axis}{axis} [um]\n" + "\n".join(
+        f"{at},{um}" for at, um in zip(targets, deviations, strict=True)
+    )
+    along = machine.direction(axis, machine.middle)
+    for text, name, kind in ((rtl, "a.rtl", "rtl"), (table, "a.csv", "csv")):
+        scene = imported(machine, text, name, kind)
+        places = {**machine.middle, axis: targets}
+        field = evaluate(scene, at=places, frame="workpiece", loop="relative")
+        assert field.error_um == pytest.approx(np.outer(deviations, along), abs=1e-6)
+
+
+@CHAINS
+@given(machines(), st.sampled_from(PAIRS), st.integers(-3000, 3000).map(lambda n: n * 1e-6))
+def test_skew_factors_are_the_error_that_they_correct(machine, plane, factor):
+    letter = dict(zip(PAIRS, "IJK", strict=True))[plane]
+    marlin = imported(machine, f"M852 {letter}{factor:.9f}\n", "a.gcode", "marlin")
+    first, second = (axis.lower() for axis in plane)
+    matrix = f"setp matrixkins.C_{first}{second} {-factor:.9f}\n"
+    linuxcnc = imported(machine, matrix, "a.hal", "linuxcnc-matrix")
+    nodes = machine.nodes()
+    points = np.array([machine.relative(q, errors=False)[:3, 3] for q in nodes])
+    # what the machine does with the correction is what its errors do, with the sign changed
+    moved = [{plane[0]: -factor * q[plane[1]]} for q in nodes]
+    correction = [machine.corrected_um(q, moves) for q, moves in zip(nodes, moved, strict=True)]
+    expected = placed_um(points, -np.array(correction))
+    for scene in (marlin, linuxcnc):
+        errors = [evaluate(scene, at=q, frame="workpiece", loop="relative").error_um for q in nodes]
+        shape = placed_um(points, np.array(errors))
+        assert shape == pytest.approx(expected, abs=0.05 + 4e-3 * np.abs(expected).max())
+
+
+WRITTEN = ("sinumerik-enc", "sinumerik-cec", "heidenhain", "linuxcnc-comp", "linuxcnc-matrix",
+           "marlin", "klipper", "fanuc-3d")  # fmt: skip
+
+
+GRIDLESS = ("linuxcnc-matrix", "marlin", "klipper")
+
+
+@CHAINS
+@given(bent_machines(), st.sampled_from(WRITTEN), st.booleans())
+def test_a_table_leaves_what_it_says(machine, name, placed):
+    scene = scene_of(machine)
+    options = Compensate(formats=(name,), loop="relative", placed=placed)
+    found = options.run(scene, ignore)
+    nodes = machine.nodes(5)
+    positions = {axis: np.array([q[axis] for q in nodes]) for axis in scene.machine.axes}
+    moves = found.controller.moves(positions)
+    by_node = np.stack([np.broadcast_to(move, len(nodes)) for move in moves.values()], -1)
+    remaining = [
+        machine.corrected_um(q, dict(zip(moves, node.tolist(), strict=True)))
+        for q, node in zip(nodes, by_node, strict=True)
+    ]
+    points = np.array([machine.relative(q, errors=False)[:3, 3] for q in nodes])
+    reported = found.controller.field(positions, points, scene).error_um
+    rotation = machine.side(machine.workpiece, machine.middle, errors=False)[:3, :3]
+    assert reported @ rotation == pytest.approx(np.array(remaining), **ROUNDING)
+    if name in GRIDLESS:  # placement and factors are fitted together: they never do harm
+        before = [machine.error_um(q) for q in nodes]
+        rms = [
+            np.sqrt(np.mean(placed_um(points, np.array(errors)) ** 2))
+            for errors in (remaining, before)
+        ]
+        assert rms[0] <= rms[1] + 0.1
+
+
+@CHAINS
+@given(bent_machines())
+def test_form_distance_and_line_are_those_of_the_part(machine):
+    scene = scene_of(machine)
+    squareness = {
+        deviation.of: deviation.value
+        for deviation in Form(loop="relative", nodes=3).run(scene, ignore).deviations
+        if deviation.kind == "squareness"
+    }
+    for first, second in PAIRS:
+        angle = machine.squareness_urad(first, second)
+        # by three points the least-squares line has the slope of the end points
+        assert squareness[f"{second} to {first}"] == pytest.approx(angle, abs=0.2, rel=1e-3)
+    ends = [{axis: machine.workspace[axis][end] for axis in LINEAR} for end in (0, 1)]
+    points = [
+        [machine.relative({**machine.middle, **end}, errors=errors)[:3, 3] for end in ends]
+        for errors in (False, True)
+    ]
+    nominal, actual = (np.linalg.norm(end - start) for start, end in points)
+    between = {"start": tuple(ends[0].items()), "end": tuple(ends[1].items())}
+    distance = Distance(**between, loop="relative", exact=True).run(scene, ignore)
+    assert distance.difference_um == pytest.approx((actual - nominal) * 1e3, **ROUNDING)
+    assert Line(**between, points=5).run(scene, ignore).length_mm == pytest.approx(nominal)
