@@ -98,15 +98,6 @@ _THESIS_CONSTANTS = {
     "EX0C": "δx_ZC",
     "EY0C": "δy_ZC",
 }
-# Of axes along x, y, z, about x, y, z: roll about the motion, pitch about the horizontal normal.
-_LINEAR_ROTATIONS = (
-    ("roll", "pitch", "yaw"),
-    ("pitch", "roll", "yaw"),
-    ("pitch", "yaw", "roll"),
-)
-
-
-_THESIS_AXES = ("X", "Y", "Z", "B", "C")
 
 
 class ErrorKind(StrEnum):
@@ -171,56 +162,57 @@ class Parameter:
         return f"{self.key} · {self.symbol} · {self.name} [{self.unit}]"
 
 
-def _component(letter: str, axis: str) -> Parameter:
-    rotation = letter in ROTARY_LETTERS
-    about, along = direction_index(letter), direction_index(axis)
-    low = "xyz"[about]
-    if is_linear(axis):
-        if rotation:
-            name = f"{_LINEAR_ROTATIONS[along][about]} of {axis}"
-        else:
-            name = (
-                f"positioning of {axis}" if about == along else f"straightness of {axis} in {low}"
-            )
-    elif rotation:
-        name = f"angular positioning of {axis}" if about == along else f"tilt of {axis} about {low}"
-    else:
-        name = f"axial error of {axis}" if about == along else f"radial error of {axis} in {low}"
-    of_thesis = axis in _THESIS_AXES
-    source = "ISO 230-1; thesis table 4-2" if of_thesis else "ISO 230-1, 3.4 (not in the thesis)"
-    kind = ErrorKind.ROTATION if rotation else ErrorKind.TRANSLATION
-    return Parameter(f"E{letter}{axis}", f"{_GREEK[letter]}{axis}", name, axis, kind, source)
+# By whether an error is constant, its axis is linear, and it is an angle: its kind, and its names
+# along or about the axis, and across it.
+_KINDS = {
+    (False, True, False): (
+        ErrorKind.TRANSLATION,
+        ("positioning of {axis}", "straightness of {axis} in {low}"),
+    ),
+    (False, True, True): (ErrorKind.ROTATION, ("{turn} of {axis}", "{turn} of {axis}")),
+    (False, False, False): (
+        ErrorKind.TRANSLATION,
+        ("axial error of {axis}", "radial error of {axis} in {low}"),
+    ),
+    (False, False, True): (
+        ErrorKind.ROTATION,
+        ("angular positioning of {axis}", "tilt of {axis} about {low}"),
+    ),
+    (True, True, True): (
+        ErrorKind.SQUARENESS,
+        ("rotation of {axis} about itself", "squareness of {axis} to {third}"),
+    ),
+    (True, False, True): (ErrorKind.ORIENTATION, ("orientation of {axis} about {low}",) * 2),
+}
+_LOCATION = ErrorKind.LOCATION, ("location of {axis} in {low}",) * 2
+# Of axes along x, y, z, about x, y, z: roll about the motion, pitch about the horizontal normal.
+_LINEAR_ROTATIONS = (
+    ("roll", "pitch", "yaw"),
+    ("pitch", "roll", "yaw"),
+    ("pitch", "yaw", "roll"),
+)
 
 
-def _constant(letter: str, axis: str) -> Parameter:
-    key = f"E{letter}0{axis}"
+def _parameter(letter: str, axis: str, *, constant: bool) -> Parameter:
+    key = f"E{letter}{'0' * constant}{axis}"
     about, along = direction_index(letter), direction_index(axis)
-    low = "xyz"[about]
-    if letter not in ROTARY_LETTERS:
-        kind = ErrorKind.LOCATION
-        name = f"location of {axis} in {low}"
-    elif not is_linear(axis):
-        kind = ErrorKind.ORIENTATION
-        name = f"orientation of {axis} about {low}"
-    else:
-        kind = ErrorKind.SQUARENESS
-        if about == along:
-            name = f"rotation of {axis} about itself"
-        else:
-            name = f"squareness of {axis} to {'XYZ'[3 - about - along]}"
-    symbol = _THESIS_CONSTANTS.get(key, f"{_CONSTANT_GREEK[letter]}_0{axis}")
-    if kind is ErrorKind.LOCATION and key in _THESIS_CONSTANTS:
+    kind, names = _KINDS.get((constant, is_linear(axis), letter in ROTARY_LETTERS), _LOCATION)
+    turn, third = _LINEAR_ROTATIONS[along][about], "XYZ"[(3 - about - along) % 3]
+    name = names[about != along].format(axis=axis, low="xyz"[about], turn=turn, third=third)
+    symbol = f"{_CONSTANT_GREEK[letter]}_0{axis}" if constant else f"{_GREEK[letter]}{axis}"
+    if key not in _THESIS_CONSTANTS if constant else axis not in "XYZBC":
+        source = f"ISO 230-1, 3.{5 if constant else 4} (not in the thesis)"
+    elif kind is ErrorKind.LOCATION:
         source = "ISO 230-1; thesis equations (left out of its table 4-2)"
-    elif key in _THESIS_CONSTANTS:
-        source = "ISO 230-1; thesis table 4-2"
     else:
-        source = "ISO 230-1, 3.5 (not in the thesis)"
-    return Parameter(key, symbol, name, axis, kind, source)
+        source = "ISO 230-1; thesis table 4-2"
+    return Parameter(key, _THESIS_CONSTANTS.get(key, symbol), name, axis, kind, source)
 
 
 @cache
 def axis_parameters(axis: str) -> tuple[Parameter, ...]:
-    return tuple(build(letter, axis) for build in (_component, _constant) for letter in DIRECTIONS)
+    both = (False, True)
+    return tuple(_parameter(k, axis, constant=constant) for constant in both for k in DIRECTIONS)
 
 
 PARAMETERS = {row.key: row for axis in AXIS_NAMES for row in axis_parameters(axis)}

@@ -205,10 +205,12 @@ class ErrorFunction(ABC):
     # keys of the tables that represent it in a scene file; empty where it is a number
     forms: ClassVar[tuple[tuple[str, ...], ...]]
     row_words: ClassVar[str]  # description of its rows
-    # description of the amplitude, with the fields {name} and {axis}
-    slider: ClassVar[str] = "{name} along {axis}; this is its largest value"
+    # description of the amplitude, with the fields {axis} and {curve}
+    slider: ClassVar[str] = "{curve.name} along {axis}; this is its largest value"
     # false where it comes from files only
     edited_as_rows: ClassVar[bool] = True
+    # true where it depends on the direction of travel
+    has_directions: ClassVar[bool] = False
     span: Span  # axis range of the curve, mm or degrees
 
     @abstractmethod
@@ -256,11 +258,6 @@ class ErrorFunction(ABC):
         return self.evaluate(coordinates[axis])
 
     @property
-    def has_directions(self) -> bool:
-        """True where it depends on the direction of travel."""
-        return False
-
-    @property
     def lines(self) -> tuple[tuple[str, "ErrorFunction"], ...]:
         """Curves along the axis of the error for a chart, each with its label."""
         return (("", self),)
@@ -280,14 +277,10 @@ class ErrorFunction(ABC):
         """Return the curve with all values multiplied by a factor."""
 
     @cached_property
-    def _peak(self) -> float:
-        values = self.evaluate(np.linspace(*self.span, self.samples))
-        return float(values[np.argmax(np.abs(values))])
-
-    @property
     def amplitude(self) -> float:
         """Largest value over the span, with its sign, µm or µrad."""
-        return self._peak
+        values = self.evaluate(np.linspace(*self.span, self.samples))
+        return float(values[np.argmax(np.abs(values))])
 
     @property
     def samples(self) -> int:
@@ -359,7 +352,7 @@ class ErrorFunction(ABC):
 
     def slider_words(self, axis: str) -> str:
         """Format the description of the amplitude for the slider."""
-        return self.slider.format(name=self.name, axis=axis)
+        return self.slider.format(axis=axis, curve=self)
 
     @classmethod
     def tidied(cls, rows: Rows) -> tuple[Rows, tuple[str, ...]]:
@@ -372,9 +365,9 @@ class ErrorFunction(ABC):
         del span, rows
         raise OptionError(cls.row_words)
 
-    @abstractmethod
     def rows(self) -> Rows:
         """Return the rows from which `from_rows` builds this curve."""
+        return ()
 
     @classmethod
     def from_curve(cls, present: "ErrorFunction", span: Span) -> Self:

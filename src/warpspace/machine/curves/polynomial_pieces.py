@@ -104,9 +104,6 @@ class Pieces(curve.ErrorFunction):
         del unit, value, position
         return f"{len(self.starts)} pieces of polynomials"
 
-    def rows(self) -> curve.Rows:
-        return [(s, *row) for s, row in zip(self.starts, self.coefficients, strict=True)]
-
 
 def fit_curves(
     evaluate: Callable[[Array], Array], span: curve.Span, kinks: Array

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -33,7 +34,7 @@ class OneNumber(ErrorFunction):
     def scaled(self, factor: float) -> Self:
         return replace(self, value=self.value * factor)
 
-    @property
+    @cached_property
     def amplitude(self) -> float:
         return self.value
 
@@ -298,6 +299,7 @@ class Directional(ErrorFunction):
     row_words = "curves by direction come from a scene file or an import"
     slider = "differs by direction of travel of {axis}; this is the larger one's amplitude"
     edited_as_rows = False
+    has_directions = True
     # towards increasing and decreasing positions; of any other kind
     forward: ErrorFunction = NOTHING
     backward: ErrorFunction = NOTHING
@@ -323,10 +325,6 @@ class Directional(ErrorFunction):
         )
 
     @property
-    def has_directions(self) -> bool:
-        return True
-
-    @property
     def lines(self) -> tuple[tuple[str, ErrorFunction], ...]:
         pairs = (("forward", self.forward), ("backward", self.backward))
         return tuple(
@@ -345,7 +343,7 @@ class Directional(ErrorFunction):
     def scaled(self, factor: float) -> Self:
         return self._with_both(lambda curve: curve.scaled(factor))
 
-    @property
+    @cached_property
     def amplitude(self) -> float:
         forward, backward = self.forward.amplitude, self.backward.amplitude
         return backward if math.isnan(backward) or abs(backward) > abs(forward) else forward
@@ -388,9 +386,6 @@ class Directional(ErrorFunction):
             curve.describe(unit, value, position) for curve in (self.forward, self.backward)
         )
         return f"forward {forward}, backward {backward}"
-
-    def rows(self) -> Rows:
-        return [*self.forward.rows(), *self.backward.rows()]
 
     @classmethod
     def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
