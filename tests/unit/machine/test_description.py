@@ -3,13 +3,7 @@
 import pytest
 
 from warpspace.exceptions import ChainError, UnknownNameError
-from warpspace.machine.axes import (
-    DIRECTIONS,
-    PARAMETERS,
-    default_keys,
-    is_axis_name,
-    parameter,
-)
+from warpspace.machine.axes import DIRECTIONS, PARAMETERS, default_keys, is_axis_name, parameter
 from warpspace.machine.definition import Chain, build_machine, parse_chain
 
 
