@@ -119,11 +119,11 @@ def _leaves(value: Any, path: str) -> Any:
     elif isinstance(value, list) and any(isinstance(part, dict | list) for part in value):
         for index, part in enumerate(value):
             yield from _leaves(part, f"{path}[{index}]")
-    elif isinstance(value, list) and len(value) > MOST_VALUES:
-        some = value[:: len(value) // MOST_VALUES]
-        yield f"{path} = {json.dumps(some, ensure_ascii=False)} of {len(value)}"
     else:
-        yield f"{path} = {json.dumps(value, ensure_ascii=False)}"
+        is_long = isinstance(value, list) and len(value) > MOST_VALUES
+        shown = value[:: len(value) // MOST_VALUES] if is_long else value
+        count = f" of {len(value)}" if is_long else ""
+        yield f"{path} = {json.dumps(shown, ensure_ascii=False)}{count}"
 
 
 def _short(lines: list[str], most: int) -> list[str]:
