@@ -162,29 +162,18 @@ class Parameter:
         return f"{self.key} · {self.symbol} · {self.name} [{self.unit}]"
 
 
-# By whether an error is constant, its axis is linear, and it is an angle: its kind, and its names
-# along or about the axis, and across it.
-_KINDS = {
-    (False, True, False): (
-        ErrorKind.TRANSLATION,
-        ("positioning of {axis}", "straightness of {axis} in {low}"),
+# By kind and whether the axis is linear: names of an error along or about its axis, and across it.
+_NAMES = {
+    (ErrorKind.TRANSLATION, True): ("positioning of {axis}", "straightness of {axis} in {low}"),
+    (ErrorKind.TRANSLATION, False): ("axial error of {axis}", "radial error of {axis} in {low}"),
+    (ErrorKind.ROTATION, True): ("{turn} of {axis}", "{turn} of {axis}"),
+    (ErrorKind.ROTATION, False): ("angular positioning of {axis}", "tilt of {axis} about {low}"),
+    (ErrorKind.SQUARENESS, True): (
+        "rotation of {axis} about itself",
+        "squareness of {axis} to {third}",
     ),
-    (False, True, True): (ErrorKind.ROTATION, ("{turn} of {axis}", "{turn} of {axis}")),
-    (False, False, False): (
-        ErrorKind.TRANSLATION,
-        ("axial error of {axis}", "radial error of {axis} in {low}"),
-    ),
-    (False, False, True): (
-        ErrorKind.ROTATION,
-        ("angular positioning of {axis}", "tilt of {axis} about {low}"),
-    ),
-    (True, True, True): (
-        ErrorKind.SQUARENESS,
-        ("rotation of {axis} about itself", "squareness of {axis} to {third}"),
-    ),
-    (True, False, True): (ErrorKind.ORIENTATION, ("orientation of {axis} about {low}",) * 2),
+    (ErrorKind.ORIENTATION, False): ("orientation of {axis} about {low}",) * 2,
 }
-_LOCATION = ErrorKind.LOCATION, ("location of {axis} in {low}",) * 2
 # Of axes along x, y, z, about x, y, z: roll about the motion, pitch about the horizontal normal.
 _LINEAR_ROTATIONS = (
     ("roll", "pitch", "yaw"),
@@ -196,7 +185,12 @@ _LINEAR_ROTATIONS = (
 def _parameter(letter: str, axis: str, *, constant: bool) -> Parameter:
     key = f"E{letter}{'0' * constant}{axis}"
     about, along = direction_index(letter), direction_index(axis)
-    kind, names = _KINDS.get((constant, is_linear(axis), letter in ROTARY_LETTERS), _LOCATION)
+    kinds = (ErrorKind.TRANSLATION, ErrorKind.ROTATION)
+    if constant:
+        angle = ErrorKind.SQUARENESS if is_linear(axis) else ErrorKind.ORIENTATION
+        kinds = (ErrorKind.LOCATION, angle)
+    kind = kinds[letter in ROTARY_LETTERS]
+    names = _NAMES.get((kind, is_linear(axis)), ("location of {axis} in {low}",) * 2)
     turn, third = _LINEAR_ROTATIONS[along][about], "XYZ"[(3 - about - along) % 3]
     name = names[about != along].format(axis=axis, low="xyz"[about], turn=turn, third=third)
     symbol = f"{_CONSTANT_GREEK[letter]}_0{axis}" if constant else f"{_GREEK[letter]}{axis}"

@@ -191,6 +191,8 @@ NEGLIGIBLE = 1e-12
 OWN_AXIS = "own"
 """Placeholder of the axis of the error among the arguments of a curve."""
 
+Coordinates = Mapping[str, Array]
+"""Axis to positions, [...], broadcastable: mm for linear axes, degrees for rotary ones."""
 Span = tuple[float, float]  # lower and upper end of an axis range, mm or degrees
 Rows = Sequence[Sequence[float]]  # numbers for editing, one row per line
 Spell = Callable[[float], str]  # formats one number
@@ -232,10 +234,7 @@ class ErrorFunction(ABC):
         return (OWN_AXIS,)
 
     def evaluate_at(
-        self,
-        axis: str,
-        coordinates: Mapping[str, Array],
-        direction: str = TravelDirection.MEAN,
+        self, axis: str, coordinates: Coordinates, direction: str = TravelDirection.MEAN
     ) -> Array:
         """Evaluate the error at axis positions reached in a direction of travel.
 

@@ -13,6 +13,7 @@ from warpspace.machine import limits
 from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.curve import (
     SPAN_SAMPLES,
+    Coordinates,
     ErrorFunction,
     Rows,
     Span,
@@ -312,10 +313,7 @@ class Directional(ErrorFunction):
         return 0.5 * (self.forward.evaluate(position) + self.backward.evaluate(position))
 
     def evaluate_at(
-        self,
-        axis: str,
-        coordinates: Mapping[str, Array],
-        direction: str = TravelDirection.MEAN,
+        self, axis: str, coordinates: Coordinates, direction: str = TravelDirection.MEAN
     ) -> Array:
         """Evaluate the mean, one of the directions, or forward − backward, [...]."""
         forward, backward = SHARES[TravelDirection(direction)]

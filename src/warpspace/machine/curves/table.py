@@ -14,6 +14,7 @@ from warpspace.exceptions import OptionError
 from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.curve import (
     MISSING,
+    Coordinates,
     ErrorFunction,
     Path,
     Rows,
@@ -223,10 +224,7 @@ class TwoArguments(ErrorFunction):
         return self._bilinear(along, np.asarray(self.middle))
 
     def evaluate_at(
-        self,
-        axis: str,
-        coordinates: Mapping[str, Array],
-        direction: str = TravelDirection.MEAN,
+        self, axis: str, coordinates: Coordinates, direction: str = TravelDirection.MEAN
     ) -> Array:
         """Interpolate between the positions of both axes, [...]."""
         del axis  # is the first of `axes`
