@@ -72,7 +72,7 @@ class History:
         return with_note(notes, edited)
 
 
-@pytest.mark.parametrize("histories", first(200, 1000))
+@pytest.mark.parametrize("histories", first(100, 1000))
 def test_merging_loses_nothing_and_gives_the_same_in_any_order(histories):
     for seed in range(histories):
         history = History(seed)

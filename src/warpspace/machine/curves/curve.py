@@ -8,7 +8,7 @@ largest value (with its sign) of any other kind.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, ClassVar, Self, cast
@@ -43,20 +43,15 @@ def is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
+@dataclass
 class ValueReader:
     """Reader that checks raw values and collects findings."""
 
-    def __init__(
-        self,
-        csv_column: CsvColumn | None = None,
-        *,
-        axis: str = "",
-        axes: Collection[str] = (),
-        curve: ReadCurve | None = None,
-    ) -> None:
-        self.findings: list[Finding] = []
-        self.axis, self.axes = axis, tuple(axes)
-        self._csv_column, self._curve = csv_column, curve
+    csv_column: CsvColumn | None = None
+    axis: str = ""  # of the error
+    axes: Collection[str] = ()  # of the machine
+    nested: ReadCurve | None = None  # reader of nested curves
+    findings: list[Finding] = field(default_factory=list[Finding])
 
     def note(self, path: Path, text: str, value: object = ...) -> None:
         """Add a finding."""
@@ -163,20 +158,20 @@ class ValueReader:
 
     def curve(self, value: object, path: Path) -> "ErrorFunction | None":
         """Read a nested curve; None where problems were noted."""
-        if self._curve is None:
+        if self.nested is None:
             self.note(path, "expected a number", value)
             return None
-        return self._curve(value, path)
+        return self.nested(value, path)
 
     def csv_points(self, file: str, column: str) -> Points:
         """Read a column of a CSV file; empty after an earlier finding."""
         if self.findings:
             return ()
-        if self._csv_column is None:
+        if self.csv_column is None:
             self.note((), "CSV files are not read here; expected the values as { table = }")
             return ()
         try:
-            return self._csv_column(file, column)
+            return self.csv_column(file, column)
         except SceneError as error:
             for problem in error.problems:
                 self.note((), f"{error.source}: {problem}")
