@@ -10,14 +10,7 @@ import numpy as np
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import chain, transforms
 from warpspace.kinematics.model import ComponentErrors, Coordinates, Loop, Model
-from warpspace.machine.axes import (
-    DIRECTIONS,
-    ErrorKind,
-    TravelDirection,
-    direction_index,
-    is_linear,
-    parameter,
-)
+from warpspace.machine import axes
 from warpspace.machine.curves.curve import Span
 from warpspace.machine.curves.polynomial_pieces import SMALL, Pieces, fit_curves
 from warpspace.machine.curves.simple import Constant, Directional
@@ -110,13 +103,13 @@ class AxisErrors:
 
     def keys(self, *, constant: bool = False) -> tuple[str, ...]:
         """Keys of the six component or constant errors: shifts, then rotations."""
-        return tuple(f"E{letter}{'0' * constant}{self.axis}" for letter in DIRECTIONS)
+        return tuple(f"E{letter}{'0' * constant}{self.axis}" for letter in axes.DIRECTIONS)
 
     def pose(self, position: Array) -> Array:
         """Nominal motion of the axis, [..., 4, 4]."""
         return chain.motion(self.model.machine.axes[self.axis], position)
 
-    def at(self, position: Array, direction: str = TravelDirection.MEAN) -> SmallMotion:
+    def at(self, position: Array, direction: str = axes.TravelDirection.MEAN) -> SmallMotion:
         """Evaluate the component errors at positions, [n], without those of two arguments."""
         along = {self.axis: np.asarray(position, dtype=float)}
         values = [
@@ -152,9 +145,9 @@ class AxisErrors:
         self._refuse_two_arguments(adds=adds)
         functions = [self.errors.functions[key] for key in self.keys() if key in self.errors]
         kinks = np.unique(np.concatenate([np.zeros(0), *(curve.kinks for curve in functions)]))
-        directions = [TravelDirection.MEAN]
+        directions = [axes.TravelDirection.MEAN]
         if any(curve.has_directions for curve in functions):
-            directions = [TravelDirection.FORWARD, TravelDirection.BACKWARD]
+            directions = [axes.TravelDirection.FORWARD, axes.TravelDirection.BACKWARD]
 
         def values(direction: str, position: Array) -> Array:
             return along(position, self.at(position, direction)).to_errors()
@@ -191,7 +184,7 @@ class AxisErrors:
 
     def _refuse_two_arguments(self, *, adds: bool) -> None:
         for key in self.keys():
-            if self._depends_on_others(key) and not (adds and key[1] in DIRECTIONS[:3]):
+            if self._depends_on_others(key) and not (adds and key[1] in axes.DIRECTIONS[:3]):
                 other = " and ".join(self.errors.arguments(key))
                 raise OptionError(
                     f"{key} depends on {other}; errors of {self.axis} cannot be converted exactly"
@@ -442,18 +435,19 @@ class SquarenessSign(StrEnum):
 
 def angle_sign(key: str) -> int:
     """Return the sign of the change of the angle between axes by a positive squareness."""
-    row = parameter(key)
-    along, about = direction_index(row.axis), row.direction
+    row = axes.parameter(key)
+    along, about = axes.direction_index(row.axis), row.direction
     return -1 if (along - about) % 3 == 1 else 1
 
 
 def squareness_keys(machine: Machine) -> tuple[str, ...]:
-    directions = {direction_index(axis) for axis in machine.axes if is_linear(axis)}
-    rows = [(parameter(key), direction_index(parameter(key).axis)) for key in machine.allowed_keys]
+    directions = {axes.direction_index(axis) for axis in machine.axes if axes.is_linear(axis)}
+    parameters = map(axes.parameter, machine.allowed_keys)
+    rows = ((row, axes.direction_index(row.axis)) for row in parameters)
     return tuple(
         row.key
         for row, along in rows
-        if row.kind is ErrorKind.SQUARENESS
+        if row.kind is axes.ErrorKind.SQUARENESS
         and row.direction != along
         and 3 - along - row.direction in directions
     )
