@@ -157,8 +157,8 @@ class Model:
     def convention_value(self) -> str | dict[str, str]:
         """Convention in scene files: one name, or one for each axis."""
         names = {axis: self.convention(axis).name for axis in self.machine.axes}
-        first, *others = {*names.values()}
-        return names if others else first
+        distinct = {*names.values()}
+        return names if len(distinct) > 1 else distinct.pop()
 
 
 def batch_shape(coordinates: Coordinates) -> tuple[int, ...]:

@@ -205,8 +205,11 @@ def _parameter(letter: str, axis: str, *, constant: bool) -> Parameter:
 
 @cache
 def axis_parameters(axis: str) -> tuple[Parameter, ...]:
-    both = (False, True)
-    return tuple(_parameter(k, axis, constant=constant) for constant in both for k in DIRECTIONS)
+    return tuple(
+        _parameter(letter, axis, constant=constant)
+        for constant in (False, True)
+        for letter in DIRECTIONS
+    )
 
 
 PARAMETERS = {row.key: row for axis in AXIS_NAMES for row in axis_parameters(axis)}
