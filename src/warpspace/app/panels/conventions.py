@@ -23,7 +23,6 @@ from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, evaluate_first_order
 from warpspace.field.grid import build_grid
 from warpspace.kinematics import conversion, transforms
-from warpspace.kinematics.axis_errors import AxisErrors
 from warpspace.kinematics.chain import branch_frames, nominal_point
 from warpspace.kinematics.model import Loop, Model, convention_names, find_convention
 from warpspace.machine.axes import TravelDirection, is_linear, parameter
@@ -206,9 +205,8 @@ def _changes(scene: Scene) -> dict[str, dict[str, ErrorFunction]]:
             value_in_middle = errors.evaluate_at(row.key, middle, scene.model.direction)
             changes["zero_at"][row.key] = Constant(span, -float(value_in_middle))
             if axis.is_linear and not row.is_rotation and row.direction != axis.index:
-                at = conversion.line_positions(
-                    AxisErrors(scene.model, errors, row.axis, span), row.key
-                )
+                axis_errors = conversion.AxisErrors(scene.model, errors, row.axis, span)
+                at = axis_errors.line_positions(row.key)
                 for line in conversion.ReferenceLine:
                     offset, slope = conversion.fit_line(at, errors.evaluate(row.key, at), line)
                     changes[line][row.key] = Poly(span, (-offset, -slope))
