@@ -85,12 +85,12 @@ def _tests(scene: Scene) -> Iterator[Candidate]:
             title = f"probe along {name}, sensing {across} against a straight edge"
             yield from _test(scene, f"straightness:axis={name}:across={across}:points=11", title)
     yield from _test(scene, "diagonals", "laser along the four body diagonals")
-    for plane, (first, second, _) in PLANES.items():
-        if not {first, second} <= set(spans):
+    for plane in PLANES:
+        if not {*plane} <= set(spans):
             continue
         yield from _test(scene, f"squareness:plane={plane}:points=11", f"square in {plane}, probed")
-        normal = [name for name in spans if name not in (first, second)]
-        radius = 0.4 * min(spans[name][1] - spans[name][0] for name in (first, second))
+        normal = [name for name in spans if name not in plane]
+        radius = 0.4 * min(spans[name][1] - spans[name][0] for name in plane)
         options = f"circular:plane={plane}:radius={radius:g}:points={ON_CIRCLE // 2}"
         for share in PLACES[:: 2 if normal else 3]:
             at = [f"{n}={spans[n][0] + share * (spans[n][1] - spans[n][0]):g}" for n in normal]

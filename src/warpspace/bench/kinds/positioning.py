@@ -10,7 +10,7 @@ from warpspace.analysis.options import Axis, option
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import DataColumn, ReadingsFile
 from warpspace.bench.placing import axis_line, motion_direction, tool_points
-from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan
+from warpspace.bench.plan import BenchPlan, Outcome, build_outcome, build_plan
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene
@@ -157,12 +157,8 @@ class Positioning(BenchTest):
         statistics = target_statistics(plan.marks["target"], plan.marks["travel_sign"], readings)
         unit = "µm" if "zero_um" in plan.setup else "µrad"
         suffix = "um" if unit == "µm" else "urad"
-        quantities = [
-            BenchQuantity(f"{key}_{suffix}", name, value, unit)
-            for key, name, value in _numbers(statistics)
-            if np.isfinite(value)
-        ]
-        return Outcome(tuple(quantities), {"targets": _target_rows(statistics, unit)})
+        rows = [(f"{key}_{suffix}", name, size) for key, name, size in _numbers(statistics)]
+        return build_outcome(rows, {"targets": _target_rows(statistics, unit)})
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
