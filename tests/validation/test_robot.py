@@ -9,8 +9,7 @@ from products import first
 from warpspace import evaluate
 from warpspace.calibration import Calibrate, calibrate, read_readings
 from warpspace.calibration.instruments import load_instrument
-from warpspace.calibration.kinds import Prediction
-from warpspace.calibration.positions import Positions
+from warpspace.calibration.kinds import Positions, Prediction
 from warpspace.calibration.readings import find_data
 from warpspace.calibration.registry import parse_readings
 from warpspace.exceptions import OptionError, SceneError

@@ -255,7 +255,7 @@ def _information(
     instrument: Instrument = NO_INSTRUMENT,
 ) -> Array:
     by_parameter, by_unknown = model.derivatives(parameters, parameters.start, model.start())
-    weights = np.concatenate(model.weights(noise_mm))[:, None]
+    weights = model.weights(noise_mm)[:, None]
     common = [common_mode(model, contribution) for contribution in instrument.shared]
     jacobian = weights * np.hstack([by_parameter, *common])
     jacobian = solve.project_out(jacobian, solve.orthonormal_basis(weights * by_unknown))

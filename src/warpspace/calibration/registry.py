@@ -11,8 +11,14 @@ from warpspace.analysis.options import Option
 from warpspace.bench.base import BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table
 from warpspace.bench.plan import BenchPlan, respond, simulate
-from warpspace.calibration.kinds import Lengths, MeasurementKind, Points, Prediction, Tracker
-from warpspace.calibration.positions import Positions
+from warpspace.calibration.kinds import (
+    Lengths,
+    MeasurementKind,
+    Points,
+    Positions,
+    Prediction,
+    Tracker,
+)
 from warpspace.calibration.readings import (
     Readings,
     ReadingTable,

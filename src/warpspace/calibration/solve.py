@@ -291,14 +291,17 @@ class MeasurementModel:
             by_unknown.append(set_up.reshape(size, len(self.unknowns)))
         return np.vstack(by_parameter), np.vstack(by_unknown)
 
-    def weights(self, otherwise_mm: float = 1.0) -> list[Array]:
-        """Return the weight of each component of each reading, [n·d], 1/mm."""
+    def weighted(self, components: Sequence[Array], otherwise_mm: float = 1.0) -> list[Array]:
+        """Multiply the components of readings, [n, d] each, by their weights, 1/mm."""
+        sigmas = (np.array(otherwise_mm) if r.sigma_mm is None else r.sigma_mm for r in self.sets)
         return [
-            np.full(readings.observed_mm.size, 1.0 / otherwise_mm)
-            if readings.sigma_mm is None
-            else np.repeat(1.0 / readings.sigma_mm, readings.observed_mm.shape[1])
-            for readings in self.sets
+            row * (1.0 / sigma)[..., None] for row, sigma in zip(components, sigmas, strict=True)
         ]
+
+    def weights(self, otherwise_mm: float = 1.0) -> Array:
+        """Return the weight of each component of each reading, [N], 1/mm."""
+        ones = [np.ones_like(readings.observed_mm) for readings in self.sets]
+        return np.concatenate([row.ravel() for row in self.weighted(ones, otherwise_mm)])
 
     @property
     def positions(self) -> dict[str, Array]:
@@ -359,7 +362,7 @@ def solve(
 ) -> Solved:
     from scipy.optimize import OptimizeResult, least_squares
 
-    weights = np.concatenate(model.weights())
+    weights = model.weights()
     count = len(parameters.keys)
     start = np.concatenate([parameters.start, model.start() if unknown is None else unknown])
     if not len(start):

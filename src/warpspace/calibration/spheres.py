@@ -13,7 +13,6 @@ from warpspace.calibration.readings import (
     ReadingTable,
     axis_columns,
     build_readings,
-    check_poses,
     check_spread,
 )
 from warpspace.exceptions import SceneError
@@ -73,7 +72,6 @@ class SphereTcp(Centres):
         observed = table.require(READ)
         rotary = rotary_axes(scene)
         coordinates, notes = axis_columns(table, scene, rotary, rotary)
-        check_poses({name: coordinates[name] for name in rotary}, table.source)
         hint = "Were they measured with TCP correction off (--kind sphere), or in another unit?"
         check_spread(spread_mm(table), TCP_SPREAD_MM, table.source, hint)
         coordinates = solve_linear(scene, coordinates, mean_centres(observed, table), table.source)
@@ -97,18 +95,15 @@ class SphereKind(Centres):
         rotary = rotary_axes(scene)
         linear = tuple(name for name in ("X", "Y", "Z") if name in scene.machine.axes)
         if len(linear) < len(READ):
-            problem = "holds positions of X, Y and Z"
-            raise SceneError(table.source, [f"{problem}; expected a machine with these three axes"])
+            raise table.refuse(
+                "holds positions of X, Y and Z; expected a machine with these three axes"
+            )
         coordinates, notes = axis_columns(table, scene, (*rotary, *linear), rotary)
-        check_poses({name: coordinates[name] for name in rotary}, table.source)
         circles = circles_of(table, scene)
         for circle in circles:
             if circle.against:
-                coordinates[circle.axis] = np.where(
-                    np.isin(table.session, circle.sessions),
-                    -coordinates[circle.axis],
-                    coordinates[circle.axis],
-                )
+                sense = np.where(np.isin(table.session, circle.sessions), -1.0, 1.0)
+                coordinates[circle.axis] = sense * coordinates[circle.axis]
                 note = (
                     f"run {', '.join(circle.sessions)}: {circle.axis} rotates opposite to that"
                     " of the scene; its positions are used with the opposite sign"
@@ -136,8 +131,8 @@ def has_centres(table: ReadingTable, scene: Scene) -> bool:
 
 def spread_mm(table: ReadingTable) -> float:
     observed, labels = table.require(READ), np.array(table.session)
-    groups = [labels == name for name in dict.fromkeys(table.session)]
-    return max(float(np.ptp(observed[group], axis=0).max()) for group in groups)
+    names = dict.fromkeys(table.session)
+    return max(float(np.ptp(observed[labels == name], axis=0).max()) for name in names)
 
 
 def mean_centres(observed_mm: Array, table: ReadingTable) -> Array:
