@@ -407,7 +407,7 @@ def test_vectors_in_the_wrong_frame_are_recognised_without_a_second_fit(monkeypa
     request = Calibrate(fit=tuple(errors))
     expected = calibrate(nominal, [right], request)
     fits = []
-    module = sys.modules["warpspace.calibration.fit"]
+    module = sys.modules["warpspace.calibration.solve"]
     monkeypatch.setattr(module, "solve", lambda *a, **k: fits.append(1) or solve(*a, **k))
     wrong = calibrate(nominal, [readings], request)
     (note,) = (note for note in wrong.notes if "likely wrong" in note)

@@ -29,7 +29,7 @@ from warpspace.calibration.next_best import find_separating, next_best, observab
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import read_readings
 from warpspace.calibration.residuals import frame_notes, join_residuals, predict_readings
-from warpspace.calibration.solve import CheckCancelled, by_name, never_cancelled, read_keys, rms_mm
+from warpspace.calibration.solve import CheckCancelled, never_cancelled, read_keys, rms_mm
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
@@ -242,7 +242,7 @@ def _report(fit: Fit, predict: Sequence[Readings]) -> Calibration:
         slopes=fit.parameters.slopes,
         fit=fit.fitted.keys,
         covariance=fit.covariance,
-        unknowns=by_name(model.unknowns, fit.solved.unknown),
+        unknowns=dict(zip(model.unknowns, fit.solved.unknown.tolist(), strict=True)),
         fitted=join_residuals(model, fit.before, fit.after),
         predicted=predicted,
         rms_before_mm=rms_mm(fit.before),

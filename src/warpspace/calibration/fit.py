@@ -6,23 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
+from warpspace.calibration import solve
 from warpspace.calibration.instruments import NO_INSTRUMENT, Instrument, common_mode, effective_dof
 from warpspace.calibration.readings import Readings
-from warpspace.calibration.solve import (
-    CheckCancelled,
-    FitParameters,
-    MeasurementModel,
-    Rank,
-    Solved,
-    automatic_parameters,
-    build_fit_parameters,
-    covariance_of,
-    find_rank,
-    never_cancelled,
-    rms_mm,
-    robust_scale,
-    solve,
-)  # fmt: skip
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import build_basis
 from warpspace.kinematics.model import Loop
@@ -52,7 +38,7 @@ class Fit:
     """One fit: the assembled readings, and by property the solution and its uncertainty."""
 
     scene: Scene
-    model: MeasurementModel
+    model: solve.MeasurementModel
     options: FitOptions
     has_assumed_scatter: bool  # of readings that state no uncertainty
     notes: tuple[str, ...]  # on that assumption
@@ -63,40 +49,40 @@ class Fit:
         scene: Scene,
         sets: Sequence[Readings],
         options: FitOptions,
-        check_cancelled: CheckCancelled = never_cancelled,
+        check_cancelled: solve.CheckCancelled = solve.never_cancelled,
     ) -> "Fit":
         has_assumed_scatter = any(readings.sigma_mm is None for readings in sets)
         sets, notes = with_scatter(scene, sets, options, check_cancelled)
-        model = MeasurementModel.of(scene, sets, check_cancelled)
+        model = solve.MeasurementModel.of(scene, sets, check_cancelled)
         return cls(scene, model, options, has_assumed_scatter, notes)
 
     @cached_property
-    def parameters(self) -> FitParameters:
+    def parameters(self) -> solve.FitParameters:
         """All parameters that may be fitted."""
         keys = self.options.keys
         if keys is None:
-            keys = automatic_parameters(self.scene, self.model.sets)
-        parameters = build_fit_parameters(self.scene, keys)
+            keys = solve.automatic_parameters(self.scene, self.model.sets)
+        parameters = solve.build_fit_parameters(self.scene, keys)
         if not parameters.keys:
             raise OptionError("no axis moves whose errors could be fitted; expected {fit} KEYS")
         return parameters
 
     @cached_property
-    def initial(self) -> Solved:
+    def initial(self) -> solve.Solved:
         """Set-ups fitted alone, with the errors of the scene."""
-        return solve(self.model, self.parameters.only(()), robust=self.options.robust)
+        return solve.solve(self.model, self.parameters.only(()), robust=self.options.robust)
 
     @cached_property
     def weights(self) -> Array:
         return self.model.weights()
 
     @cached_property
-    def rank(self) -> Rank:
+    def rank(self) -> solve.Rank:
         parameters = self.parameters
         jacobian = self.model.derivatives(parameters, parameters.start, self.initial.unknown)
         by_parameter, by_unknown = (self.weights[:, None] * columns for columns in jacobian)
         tolerance = self.model.rank_tolerance
-        return find_rank(parameters.keys, by_parameter, by_unknown, tolerance)
+        return solve.find_rank(parameters.keys, by_parameter, by_unknown, tolerance)
 
     @cached_property
     def prior(self) -> tuple[Array, Array] | None:
@@ -114,7 +100,7 @@ class Fit:
         return np.array([row.centre for row in rows]), widths / np.sqrt(3.0)
 
     @cached_property
-    def fitted(self) -> FitParameters:
+    def fitted(self) -> solve.FitParameters:
         """The parameters that are fitted; the others keep the values of the scene."""
         keys = self.rank.independent if self.prior is None else self.parameters.keys
         model, count, unknowns = self.model, len(keys), len(self.model.unknowns)
@@ -132,8 +118,8 @@ class Fit:
         return self.parameters.only(keys)
 
     @cached_property
-    def solved(self) -> Solved:
-        solved = solve(
+    def solved(self) -> solve.Solved:
+        solved = solve.solve(
             self.model, self.fitted, self.prior, self.initial.unknown, robust=self.options.robust
         )
         for row, amplitude in zip(self.fitted.parameters, solved.amplitudes, strict=True):
@@ -171,14 +157,14 @@ class Fit:
 
     def standard_deviation(self, deviations: Array) -> float:
         if self.options.robust:
-            return robust_scale(deviations, self.dof)
+            return solve.robust_scale(deviations, self.dof)
         return float(np.sqrt(np.sum(deviations**2) / max(self.dof, 1)))
 
     @cached_property
     def scatter_covariance(self) -> Array:
         """Covariance of parameters and set-ups from the scatter of readings, [k + m, k + m]."""
         is_scaled = self.model.has_uncertainties or self.solved.scale is not None
-        return covariance_of(self.solved) * (1.0 if is_scaled else self.sigma_mm**2)
+        return solve.covariance_of(self.solved) * (1.0 if is_scaled else self.sigma_mm**2)
 
     @property
     def scatter_dof(self) -> float:
@@ -190,7 +176,7 @@ class Fit:
     def shared_shifts(self) -> list[Array]:
         """Change of parameters and set-ups per u of each shared contribution, [k + m, c] each."""
         weights = np.sqrt(self.solved.trust) * self.weights[:, None]
-        gain = covariance_of(self.solved) @ self.solved.weighted.T
+        gain = solve.covariance_of(self.solved) @ self.solved.weighted.T
         gain = gain[:, : len(weights)]
         shared = self.options.instrument.shared
         return [-gain @ (weights * common_mode(self.model, row)) for row in shared]
@@ -274,11 +260,14 @@ class Fit:
         deviations = (deviations + (jacobian @ step)[: len(deviations)]) / trust
         parts = np.split(deviations / self.weights, np.cumsum([row.size for row in residuals])[:-1])
         vectors = [part.reshape(row.shape) for part, row in zip(parts, residuals, strict=True)]
-        return self.standard_deviation(deviations), rms_mm(vectors)
+        return self.standard_deviation(deviations), solve.rms_mm(vectors)
 
 
 def with_scatter(
-    scene: Scene, sets: Sequence[Readings], options: FitOptions, check_cancelled: CheckCancelled
+    scene: Scene,
+    sets: Sequence[Readings],
+    options: FitOptions,
+    check_cancelled: solve.CheckCancelled,
 ) -> tuple[Sequence[Readings], tuple[str, ...]]:
     """Weight readings without uncertainty by the instrument, or by a fit without priors."""
     if all(readings.sigma_mm is not None for readings in sets):
@@ -301,7 +290,7 @@ def with_scatter(
 
 def _join_covariance(
     scene: Scene,
-    parameters: FitParameters,
+    parameters: solve.FitParameters,
     null_space: Sequence[Mapping[str, float]],
     fitted: Covariance,
 ) -> Covariance | None:
@@ -348,7 +337,7 @@ def _join_covariance(
     return joined.extended(fitted.measured_range)
 
 
-def _pure_error(model: MeasurementModel, residuals: Sequence[Array]) -> tuple[float, int]:
+def _pure_error(model: solve.MeasurementModel, residuals: Sequence[Array]) -> tuple[float, int]:
     """Sum the squared deviations of repeated readings from their mean; and degrees of freedom."""
     scatter, repeated = 0.0, 0
     for readings, weighted in zip(model.sets, model.weighted(residuals), strict=True):

@@ -95,11 +95,8 @@ def _tests(scene: Scene) -> Iterator[Candidate]:
         for share in PLACES[:: 2 if normal else 3]:
             at = [f"{n}={spans[n][0] + share * (spans[n][1] - spans[n][0]):g}" for n in normal]
             title = f"ball bar, circle {plane}, radius {radius:g} mm"
-            if not at:
-                yield from _test(scene, options, title)
-                continue
-            title += f" at {', '.join(at).replace('=', ' ')}"
-            yield from _test(scene, f"{options}:at={','.join(at)}", title)
+            title += f" at {', '.join(at).replace('=', ' ')}" if at else ""
+            yield from _test(scene, options + f":at={','.join(at)}" * bool(at), title)
 
 
 def _test(scene: Scene, kind: str, title: str) -> Iterator[Candidate]:

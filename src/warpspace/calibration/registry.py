@@ -78,18 +78,11 @@ class TestReadings(MeasurementKind):
     def _readings(
         self, plan: BenchPlan, read_um: Array, source: str, lines: tuple[int, ...]
     ) -> Readings:
-        return Readings(
-            self._text,
-            {name: values[plan.site] for name, values in plan.coordinates.items()},
-            plan.point_mm[plan.site],
-            read_um[:, None] * MM_PER_UM,
-            None,
-            (source,) * len(lines),
-            lines,
-            source,
-            (f"{self.test.title}: {plan.place}",),
-            plan=plan,
-        )
+        coordinates = {name: values[plan.site] for name, values in plan.coordinates.items()}
+        arrays = coordinates, plan.point_mm[plan.site], read_um[:, None] * MM_PER_UM, None
+        notes = (f"{self.test.title}: {plan.place}",)
+        rows = (source,) * len(lines), lines, source
+        return Readings(self._text, *arrays, *rows, notes, plan=plan)
 
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
         return tuple(f"{readings.source} {name}" for name in _plan(readings).setup)

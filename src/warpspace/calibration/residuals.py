@@ -6,33 +6,25 @@ from pathlib import Path
 
 import numpy as np
 
+from warpspace.calibration import solve
 from warpspace.calibration.calibration_result import Residuals
 from warpspace.calibration.fit import Fit, with_scatter
 from warpspace.calibration.instruments import common_mode
 from warpspace.calibration.kinds import in_other_frame
 from warpspace.calibration.readings import Readings
-from warpspace.calibration.solve import (
-    MAD,
-    MeasurementModel,
-    by_name,
-    orthonormal_basis,
-    project_out,
-    rms_mm,
-    solve,
-)  # fmt: skip
 from warpspace.units import UM_PER_MM, Array
 
 OUTLIER = 4.0  # robust standard deviations beyond which a reading is an outlier
 
 
 def join_residuals(
-    model: MeasurementModel, before: Sequence[Array], after: Sequence[Array]
+    model: solve.MeasurementModel, before: Sequence[Array], after: Sequence[Array]
 ) -> tuple[Residuals, ...]:
     """Join the residuals of each file, [n, d], mm, before and after the fit; find outliers."""
     lengths = [np.linalg.norm(row, axis=-1) for row in model.weighted(after)]
     pooled = np.concatenate(lengths)
     middle = float(np.median(pooled))
-    width = MAD * float(np.median(np.abs(pooled - middle)))
+    width = solve.MAD * float(np.median(np.abs(pooled - middle)))
     limit = middle + OUTLIER * max(width, 1e-9)
     outliers = [tuple(map(int, np.flatnonzero(row > limit))) for row in lengths]
     return tuple(Residuals(*row) for row in zip(model.sets, before, after, outliers, strict=True))
@@ -49,17 +41,17 @@ def predict_readings(
         return (), None, ()
     if fit.options.instrument.scatter[0]:
         sets, _ = with_scatter(fit.scene, sets, fit.options, fit.model.check_cancelled)
-    model = MeasurementModel.of(fit.scene, sets, fit.model.check_cancelled)
-    before = by_name(fit.model.unknowns, fit.initial.unknown)
-    after = by_name(fit.model.unknowns, fit.solved.unknown)
+    model = solve.MeasurementModel.of(fit.scene, sets, fit.model.check_cancelled)
+    before = dict(zip(fit.model.unknowns, fit.initial.unknown, strict=True))
+    after = dict(zip(fit.model.unknowns, fit.solved.unknown, strict=True))
     new = [name for name in model.unknowns if name not in after]
     notes: tuple[str, ...] = ()
     if new:
         errors = fit.fitted.errors_with(fit.solved.amplitudes)
         fixed = replace(fit.fitted.only(()), errors=errors)
         for values, parameters in ((before, fit.parameters.only(())), (after, fixed)):
-            unknown = solve(model, parameters, robust=fit.options.robust).unknown
-            set_up = by_name(model.unknowns, unknown)
+            unknown = solve.solve(model, parameters, robust=fit.options.robust).unknown
+            set_up = dict(zip(model.unknowns, unknown, strict=True))
             values |= {name: set_up[name] for name in new}
         notes = (f"set-ups fitted to the predicted readings themselves: {', '.join(new)}",)
     unknown = np.array([after[name] for name in model.unknowns])
@@ -74,7 +66,7 @@ def predict_readings(
 
 def _coverage(
     fit: Fit,
-    model: MeasurementModel,
+    model: solve.MeasurementModel,
     new: Sequence[str],
     unknown: Array,
     residuals: Sequence[Array],
@@ -92,12 +84,14 @@ def _coverage(
     count = len(fit.fitted.keys)
     shared_set_ups = [name for name in model.unknowns if name not in new]
     columns = [*range(count), *(count + fit.model.unknowns.index(n) for n in shared_set_ups)]
-    set_up = orthonormal_basis(weights * by_unknown[:, is_new])
-    jacobian = project_out(weights * np.hstack([by_parameter, by_unknown[:, ~is_new]]), set_up)
+    set_up = solve.orthonormal_basis(weights * by_unknown[:, is_new])
+    jacobian = solve.project_out(
+        weights * np.hstack([by_parameter, by_unknown[:, ~is_new]]), set_up
+    )
     covariance = fit.scatter_covariance[np.ix_(columns, columns)]
     variance = np.sum((jacobian @ covariance) * jacobian, axis=1)
     for contribution, shift in zip(fit.options.instrument.shared, fit.shared_shifts, strict=True):
-        added = project_out(weights * common_mode(model, contribution), set_up)
+        added = solve.project_out(weights * common_mode(model, contribution), set_up)
         variance += np.sum((added - jacobian @ shift[columns]) ** 2, axis=1)
     leverage = np.sum(set_up**2, axis=1)
     half_widths = t.ppf(0.975, fit.scatter_dof) * np.sqrt(variance + 1.0 - leverage)
@@ -118,7 +112,7 @@ def frame_notes(fit: Fit) -> tuple[str, ...]:
         return ()
     from scipy.stats import f
 
-    best_sigma, best_rms, changed = fit.sigma_mm, rms_mm(fit.after), turned[:0]
+    best_sigma, best_rms, changed = fit.sigma_mm, solve.rms_mm(fit.after), turned[:0]
     for chosen in [turned, *([at] for at in turned if turned[1:])]:
         residuals = list(fit.after)
         for at in chosen:
@@ -136,7 +130,7 @@ def frame_notes(fit: Fit) -> tuple[str, ...]:
     other, letter = ("workpiece", "w") if frame == "machine" else ("machine", "R")
     note = (
         f"{files}: in the {frame} frame these vectors leave residuals of"
-        f" {UM_PER_MM * rms_mm(fit.after):.3g} µm (RMS), in the {other} frame"
+        f" {UM_PER_MM * solve.rms_mm(fit.after):.3g} µm (RMS), in the {other} frame"
         f" {UM_PER_MM * best_rms:.3g} µm: the result is likely wrong; expected --frame {other},"
         f" or columns ex_{letter}_um and so on"
     )

@@ -207,13 +207,7 @@ def _fit(
     complex_mm = (flat - centre) @ np.array([1.0, 1j])
     along = abs(np.vdot(turn, complex_mm))
     against = abs(np.vdot(np.conj(turn), complex_mm))
-    return Circle(
-        axis,
-        sessions,
-        "XYZ"[first] + "XYZ"[second],
-        (float(centre[0]), float(centre[1])),
-        radius,
-        float(np.sqrt(np.mean(away**2))),
-        len(flat),
-        bool(against > along),
-    )
+    plane, middle = "XYZ"[first] + "XYZ"[second], (float(centre[0]), float(centre[1]))
+    rms_mm = float(np.sqrt(np.mean(away**2)))
+    is_against = bool(against > along)
+    return Circle(axis, sessions, plane, middle, radius, rms_mm, len(flat), is_against)

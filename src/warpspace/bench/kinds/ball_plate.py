@@ -165,7 +165,6 @@ class BallPlate(BenchTest):
         )
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
-        first, second = self.plane
         columns = ["XYZ".index(name) for name in self.plane]
         largest = max(float(np.abs(plate_residuals(run.plan, run.readings)).max()) for run in runs)
         marks = runs[0].plan.marks
@@ -185,13 +184,9 @@ class BallPlate(BenchTest):
                 moved = nominal[chosen] + factor * residual_um / UM_PER_MM
                 style = "dots" if run.is_measured else "line"
                 curves += _net(run.label("actual"), moved, ball_row, ball_column, 0, style)
-            charts.append(
-                Lines(
-                    "plane", f"Position {int(index) + 1}", f"{first.lower()} [mm]",
-                    f"{second.lower()} [mm]", tuple(curves), (),
-                    f"Deviations {factor:,.0f} × exaggerated.",
-                )
-            )  # fmt: skip
+            labels = f"Position {int(index) + 1}", *(f"{axis.lower()} [mm]" for axis in self.plane)
+            note = f"Deviations {factor:,.0f} × exaggerated."
+            charts.append(Lines("plane", *labels, tuple(curves), note=note))
         return tuple(charts)
 
 

@@ -317,12 +317,8 @@ class Circular(BenchTest):
         title = f"{self.bar} deviation along the circle about {self.rotary}"
         if not self.rotary:
             title = f"{self.plane} plane, 0° at +{self.plane[0]}, 90° at +{self.plane[1]}"
-        return (
-            Lines(
-                "polar", title, "angle [°]", "deviation [µm]", tuple(curves), (),
-                "As read." if self.rotary else "About the least-squares centre.",
-            ),
-        )  # fmt: skip
+        note = "As read." if self.rotary else "About the least-squares centre."
+        return (Lines("polar", title, "angle [°]", "deviation [µm]", tuple(curves), note=note),)
 
 
 def check_circle(

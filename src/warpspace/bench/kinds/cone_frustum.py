@@ -174,9 +174,5 @@ class ConeFrustum(BenchTest):
             fit = fit_circle_readings(run.plan, run.readings)
             x = run.plan.marks["angle_deg"]
             curves.append(run.curve("radial deviation", x, fit.radial_um, once_round=True))
-        return (
-            Lines(
-                "polar", "Circle on the cone", "angle [°]", "radial deviation [µm]", tuple(curves),
-                (), "About the least-squares centre.",
-            ),
-        )  # fmt: skip
+        labels = "Circle on the cone", "angle [°]", "radial deviation [µm]"
+        return (Lines("polar", *labels, tuple(curves), note="About the least-squares centre."),)

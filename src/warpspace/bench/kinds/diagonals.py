@@ -284,13 +284,9 @@ class Diagonals(BenchTest):
                         style = "line" if chosen is forth else "dashed"
                         style = "dots" if run.is_measured else style
                         curves.append(Curve(run.label(text), x, y, index, style))
-        return (
-            Lines(
-                "lines", f"Along the {self.kind} diagonals", "distance from the start [mm]",
-                "deviation [µm]", tuple(curves), (),
-                "P: the axis runs upwards, N: downwards, in the order x, y, z.",
-            ),
-        )  # fmt: skip
+        title, note = f"Along the {self.kind} diagonals", "P: the axis runs upwards, N: downwards"
+        labels = title, "distance from the start [mm]", "deviation [µm]"
+        return (Lines("lines", *labels, tuple(curves), note=f"{note}, in the order x, y, z."),)
 
 
 def _alike(forward: Array, backward: Array) -> bool:

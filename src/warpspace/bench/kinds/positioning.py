@@ -189,12 +189,9 @@ class Positioning(BenchTest):
                 if run.is_measured:
                     bands.append(Band(f"{word} ±2s", x, mean - spread, mean + spread, row))
         axis = plan.place.partition(" ")[0]
-        return (
-            Lines(
-                "lines", f"Positioning of {axis}", f"{axis} [{'mm' if linear else '°'}]",
-                f"deviation [{unit}]", tuple(curves), tuple(bands), note,
-            ),
-        )  # fmt: skip
+        x_label, y_label = f"{axis} [{'mm' if linear else '°'}]", f"deviation [{unit}]"
+        labels = f"Positioning of {axis}", x_label, y_label
+        return (Lines("lines", *labels, tuple(curves), tuple(bands), note),)
 
 
 def _numbers(statistics: TargetStatistics) -> list[tuple[str, str, float]]:

@@ -25,23 +25,6 @@ CHANNELS = ("x_um", "y_um", "z_um", "a_urad", "b_urad", "c_urad")
 """Across, across, along the axis; about the same three: E_XC, E_YC, E_ZC, E_AC, E_BC, E_CC of C."""
 
 
-@dataclass(frozen=True)
-class Motions:
-    """Error motions of an axis over its position."""
-
-    angle_deg: Array  # [n]; ascending
-    # [n], µm and µrad; towards a point that turns with the axis (rotating sensitive direction),
-    # about the least-squares centre
-    radial: Array
-    tilt: Array
-    # [n], µm and µrad; about their means; the angular one NaN where it was not measured
-    axial: Array
-    angular: Array
-    # location in µm along the two directions across the axis, orientation in µrad about them: the
-    # axis average line
-    average_line: Sequence[float]
-
-
 @dataclass(frozen=True, kw_only=True)
 class RotaryAxis(BenchTest):
     """Error motions of a rotary table, a swivelling head or a spindle."""
@@ -128,23 +111,21 @@ class RotaryAxis(BenchTest):
         )  # fmt: skip
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
-        error_motions = motions(plan, readings)
+        angle_deg, motions, average_line = error_motions(plan, readings)
         axis = plan.place.partition(" ")[0]
         rows: list[tuple[str, str, float]] = [
-            ("radial_um", "radial error motion", np.ptp(error_motions.radial)),
-            ("axial_um", "axial error motion", np.ptp(error_motions.axial)),
-            ("tilt_urad", "tilt error motion", np.ptp(error_motions.tilt)),
-            ("angular_urad", "angular positioning", np.ptp(error_motions.angular)),
+            ("radial_um", "radial error motion", np.ptp(motions["radial"])),
+            ("axial_um", "axial error motion", np.ptp(motions["axial"])),
+            ("tilt_urad", "tilt error motion", np.ptp(motions["tilt"])),
+            ("angular_urad", "angular positioning", np.ptp(motions["angular"])),
         ]
         across = {"A": "yz", "B": "zx", "C": "xy"}[axis[0]]
         parts = [(f"E{x.upper()}0{axis}", "um", f"location in {x}") for x in across]
         parts += [(f"E{TURNS[x]}0{axis}", "urad", f"orientation about {x}") for x in across]
-        for (key, unit, text), value in zip(parts, error_motions.average_line, strict=True):
+        for (key, unit, text), value in zip(parts, average_line, strict=True):
             rows.append((f"{key}_{unit}", f"{text} ({key})", value))
-        details: dict[str, object] = {"angle_deg": error_motions.angle_deg.tolist()}
-        for name in ("radial", "axial", "tilt", "angular"):
-            details[f"{name}_motion"] = getattr(error_motions, name).tolist()
-        return build_outcome(rows, details)
+        details = {f"{name}_motion": values.tolist() for name, values in motions.items()}
+        return build_outcome(rows, {"angle_deg": angle_deg.tolist(), **details})
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         axis = runs[0].plan.place.partition(" ")[0]
@@ -157,16 +138,22 @@ class RotaryAxis(BenchTest):
         ):
             curves: list[Curve] = []
             for run in runs:
-                error_motions = motions(run.plan, run.readings)
-                x, y = error_motions.angle_deg, getattr(error_motions, name)
-                curves.append(run.curve(f"{name} error motion", x, y, once_round=is_full(x)))
+                x, motions, _ = error_motions(run.plan, run.readings)
+                full = is_full(x)
+                curves.append(run.curve(f"{name} error motion", x, motions[name], once_round=full))
             labels = f"{axis}: {name}", f"{axis} [°]", f"deviation [{unit}]"
             charts.append(Lines("polar", *labels, tuple(curves)))
         return tuple(charts)
 
 
-def motions(plan: BenchPlan, readings: Array) -> Motions:
-    """Compute the error motions from the readings of six channels, [6 n]."""
+def error_motions(plan: BenchPlan, readings: Array) -> tuple[Array, dict[str, Array], list[float]]:
+    """Compute error motions, [n], µm and µrad, from the readings of six channels, [6 n].
+
+    Positions, [n], ascend. Radial and tilt are taken towards a point that turns with the axis
+    (rotating sensitive direction), about the least-squares centre; axial and angular about their
+    means, the angular one NaN where it was not measured. Last, the axis average line: location in
+    µm along the two directions across the axis, orientation in µrad about them.
+    """
     channels = readings.reshape(6, -1)
     angle_deg = plan.marks["angle_deg"][: channels.shape[1]]
     order = np.argsort(angle_deg, kind="stable")
@@ -184,15 +171,14 @@ def motions(plan: BenchPlan, readings: Array) -> Motions:
 
     # The axis leans towards +across by a turn about upright, towards +upright by one about −across.
     leaning = b * cosine - a * sine
-    return Motions(
-        angle_deg,
-        about_centre(x * cosine + y * sine),
-        about_centre(leaning),
-        z - z.mean(),
-        c - c.mean(),
-        # means over the turn without the once-per-turn part of an eccentric artefact
-        [float(once_round(values)[0]) for values in (x, y, a, b)],
-    )
+    motions = {
+        "radial": about_centre(x * cosine + y * sine),
+        "axial": z - z.mean(),
+        "tilt": about_centre(leaning),
+        "angular": c - c.mean(),
+    }
+    # means over the turn without the once-per-turn part of an eccentric artefact
+    return angle_deg, motions, [float(once_round(values)[0]) for values in (x, y, a, b)]
 
 
 def _eccentricity(theta: Array) -> dict[str, Array]:
@@ -339,9 +325,5 @@ class RTest(BenchTest):
                 for index, name in enumerate("xyz")
             ]
         axis = runs[0].plan.place.partition(" ")[0]
-        return (
-            Lines(
-                "lines", f"Tool minus ball while {axis} turns", f"{axis} [°]", "reading [µm]",
-                tuple(curves),
-            ),
-        )  # fmt: skip
+        labels = f"Tool minus ball while {axis} turns", f"{axis} [°]", "reading [µm]"
+        return (Lines("lines", *labels, tuple(curves)),)

@@ -121,13 +121,9 @@ class Straightness(BenchTest):
         return axis, "xyz".index(self.across) if self.across else (along + 1) % 3
 
     def plan(self, scene: Scene) -> BenchPlan:
-        axis, _ = self.directions(scene)
-        position = np.linspace(*scene.axis_span(axis), self.points)
-        return self._lay(
-            scene,
-            np.concatenate([position, position[::-1]]),
-            np.repeat([1.0, -1.0], self.points),
-        )
+        position = np.linspace(*scene.axis_span(self.directions(scene)[0]), self.points)
+        there_and_back = np.concatenate([position, position[::-1]])
+        return self._lay(scene, there_and_back, np.repeat([1.0, -1.0], self.points))
 
     def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         places = len(np.unique(np.round(table["position_mm"], 6)))
@@ -165,13 +161,8 @@ class Straightness(BenchTest):
                 curves += _lines_drawn(lines, ("end_points", "minimum_zone"), position, level)
         axis = runs[0].plan.place.partition(" ")[0]
         across = "xyz"[int(np.argmax(np.abs(runs[0].plan.direction[0])))]
-        return (
-            Lines(
-                "lines", f"Straightness of {axis} in {across}", f"along {axis} [mm]",
-                "deviation [µm]",
-                tuple(curves), (), "About the least-squares line.",
-            ),
-        )  # fmt: skip
+        labels = f"Straightness of {axis} in {across}", f"along {axis} [mm]", "deviation [µm]"
+        return (Lines("lines", *labels, tuple(curves), note="About the least-squares line."),)
 
 
 def _lines_drawn(
@@ -244,14 +235,10 @@ class Squareness(BenchTest):
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         key, sign = placing.PLANES[self.plane], float(plan.marks["gain_sign"][0])
         first, second = (lines for _, _, lines in _arms(plan, readings))
-        rows = [
-            (
-                f"{name}_urad",
-                f"squareness {key}, {line_text}",
-                sign * (first[name].slope + second[name].slope),
-            )
-            for name, line_text in REFERENCES.items()
-        ]
+        rows: list[tuple[str, str, float]] = []
+        for name, line_text in REFERENCES.items():
+            angle = sign * (first[name].slope + second[name].slope)
+            rows.append((f"{name}_urad", f"squareness {key}, {line_text}", angle))
         for axis, lines in zip(self.plane, (first, second), strict=True):
             height = lines["least_squares"].deviation_um
             rows.append((f"straightness_{axis}_um", f"straightness of {axis}", height))
@@ -267,13 +254,9 @@ class Squareness(BenchTest):
                 curves.append(run.curve("deviation", position, mean - level))
                 if run is runs[-1]:
                     curves += _lines_drawn(lines, tuple(REFERENCES), position, level)
-            other = self.plane[1 - index]
-            charts.append(
-                Lines(
-                    "lines", f"{axis} runs, deviation along {other}", f"along {axis} [mm]",
-                    "deviation [µm]", tuple(curves),
-                )
-            )  # fmt: skip
+            title = f"{axis} runs, deviation along {self.plane[1 - index]}"
+            labels = title, f"along {axis} [mm]", "deviation [µm]"
+            charts.append(Lines("lines", *labels, tuple(curves)))
         return tuple(charts)
 
 
