@@ -184,7 +184,8 @@ class BallPlate(BenchTest):
                 moved = nominal[chosen] + factor * residual_um / UM_PER_MM
                 style = "dots" if run.is_measured else "line"
                 curves += _net(run.label("actual"), moved, ball_row, ball_column, 0, style)
-            labels = f"Position {int(index) + 1}", *(f"{axis.lower()} [mm]" for axis in self.plane)
+            x_label, y_label = (f"{axis.lower()} [mm]" for axis in self.plane)
+            labels = f"Position {int(index) + 1}", x_label, y_label
             note = f"Deviations {factor:,.0f} × exaggerated."
             charts.append(Lines("plane", *labels, tuple(curves), note=note))
         return tuple(charts)
