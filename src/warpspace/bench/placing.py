@@ -82,12 +82,18 @@ def _frames_of(model: Model, coordinates: Coordinates, axis: str) -> tuple[AxisF
     raise UnknownNameError("axis", axis, model.machine.axes)
 
 
-def following_axes(model: Model) -> tuple[str, str, str]:
-    """Return the three linear axes that hold the tool on a point: the first per direction."""
+def linear_axes(machine: Machine) -> dict[int, str]:
+    """Return the first linear axis along each direction, in the order of the machine."""
     axes: dict[int, str] = {}
-    for axis in model.machine.axes.values():
+    for axis in machine.axes.values():
         if axis.is_linear:
             axes.setdefault(direction_index(axis.name), axis.name)
+    return axes
+
+
+def following_axes(model: Model) -> tuple[str, str, str]:
+    """Return the three linear axes that hold the tool on a point."""
+    axes = linear_axes(model.machine)
     if len(axes) != 3:
         raise OptionError(
             f"the machine {model.machine.chain} lacks three linear axes; expected one along each"

@@ -16,19 +16,24 @@ from warpspace.calibration.calibration_result import (
     FittedParameter,
     Target,
     describe_target,
-)  # fmt: skip
-from warpspace.calibration.fit import Fit, FitOptions
+)
+from warpspace.calibration.fit import (
+    Fit,
+    FitOptions,
+    frame_notes,
+    join_residuals,
+    predict_readings,
+)
 from warpspace.calibration.instruments import (
     NO_INSTRUMENT,
     Instrument,
     build_budget,
     instrument_names,
     load_instrument,
-)  # fmt: skip
+)
 from warpspace.calibration.next_best import find_separating, next_best, observability, u95_at
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import read_readings
-from warpspace.calibration.residuals import frame_notes, join_residuals, predict_readings
 from warpspace.calibration.solve import CheckCancelled, never_cancelled, read_keys, rms_mm
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene

@@ -107,12 +107,9 @@ def _plan(readings: Readings) -> BenchPlan:
 
 
 def _set_up(readings: Readings, unknowns: tuple[str, ...]) -> Array:
-    set_up: Mapping[str, Array] = {
-        f"{readings.source} {name}": column for name, column in _plan(readings).setup.items()
-    }
-    none = np.zeros(len(readings))
-    columns = [set_up.get(name, none) for name in unknowns]
-    return np.stack(columns, -1) if columns else np.zeros((len(none), 0))
+    set_up = {f"{readings.source} {name}": row for name, row in _plan(readings).setup.items()}
+    none = np.zeros((len(readings), 0))
+    return np.column_stack([none, *(set_up.get(name, none.sum(axis=1)) for name in unknowns)])
 
 
 def _value(option: Option, text: str, test: str) -> Any:

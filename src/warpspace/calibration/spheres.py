@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.analysis.axis_motion import fit_flat_circle
-from warpspace.bench.placing import ball_point
+from warpspace.bench.placing import ball_point, linear_axes
 from warpspace.calibration.kinds import FreePlacementKind
 from warpspace.calibration.readings import (
     Circle,
@@ -150,16 +150,11 @@ def solve_linear(
     scene: Scene, coordinates: dict[str, Array], target_mm: Array, source: str
 ) -> dict[str, Array]:
     """Find the positions of the linear axes that nominally bring the tool point to targets."""
-    one_per_direction: dict[int, str] = {}
-    for name, axis in scene.machine.axes.items():
-        if axis.is_linear:
-            one_per_direction.setdefault(direction_index(name), name)
-    linear = list(one_per_direction.values())
+    linear = list(linear_axes(scene.machine).values())
     zero = {**coordinates, **{name: np.zeros(len(target_mm)) for name in linear}}
     start = ball_point(scene.model, zero)
-    columns = [
-        ball_point(scene.model, {**zero, name: np.ones(len(target_mm))}) - start for name in linear
-    ]
+    ones = np.ones(len(target_mm))
+    columns = [ball_point(scene.model, {**zero, name: ones}) - start for name in linear]
     system = np.stack(columns, -1) if columns else np.zeros((len(target_mm), 3, 0))
     solved = np.linalg.pinv(system) @ (target_mm - start)[..., None]
     missed_mm = float(np.abs(system @ solved - (target_mm - start)[..., None]).max())
@@ -185,9 +180,7 @@ def circles_of(table: ReadingTable, scene: Scene) -> tuple[Circle, ...]:
             runs.setdefault(moving[0], []).append(session)
     circles: list[Circle] = []
     for axis, sessions in runs.items():
-        groups: list[tuple[str, ...]] = [(session,) for session in sessions]
-        if len(sessions) > 1:
-            groups.append(tuple(sessions))
+        groups = dict.fromkeys([*((session,) for session in sessions), tuple(sessions)])
         for group in groups:
             members = np.isin(labels, group)
             circles.append(_fit(axis, group, read[members], turned[axis][members], scene))
