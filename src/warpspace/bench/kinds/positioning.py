@@ -35,20 +35,16 @@ class TargetStatistics:
 def target_statistics(target: Array, travel_sign: Array, readings: Array) -> TargetStatistics:
     """Compute mean and standard deviation of the readings per target and direction."""
     targets, index = np.unique(np.round(target, 6), return_inverse=True)
-    mean = np.full((2, len(targets)), np.nan)
-    deviation = np.full((2, len(targets)), np.nan)
+    mean, deviation = np.empty((2, 2, len(targets)))
     for row, sign in enumerate((FORWARD, BACKWARD)):
         chosen = travel_sign == sign
         at, values = index.reshape(-1)[chosen], readings[chosen]
         count = np.bincount(at, minlength=len(targets))
         is_measured = count > 0
-        mean[row, is_measured] = (
-            np.bincount(at, values, len(targets))[is_measured] / count[is_measured]
-        )
+        mean[row] = np.bincount(at, values, len(targets)) / np.where(is_measured, count, np.nan)
         squares = np.bincount(at, (values - mean[row, at]) ** 2, len(targets))
-        deviation[row, is_measured] = np.sqrt(
-            squares[is_measured] / np.maximum(count[is_measured] - 1, 1)
-        )
+        free = np.where(is_measured, np.maximum(count - 1, 1), np.nan)
+        deviation[row] = np.sqrt(squares / free)
     return TargetStatistics(targets, mean, deviation)
 
 
