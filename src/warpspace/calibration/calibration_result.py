@@ -432,5 +432,6 @@ def _describe_circle(circle: Circle) -> str:
 def _before_and_after(before: Array, after: Array) -> list[Curve]:
     """Draw points, [n, 2], before and after the fit, and a line from one to the other."""
     x, y = np.stack([before, after, np.full_like(before, np.nan)], axis=1).reshape(-1, 2).T
-    dots = (Curve("before", *before.T, 0, "dots"), Curve("after", *after.T, 1, "dots"))
-    return [Curve("", x, y, style="thin"), *dots]
+    first = Curve("before", before[:, 0], before[:, 1], 0, "dots")
+    last = Curve("after", after[:, 0], after[:, 1], 1, "dots")
+    return [Curve("", x, y, style="thin"), first, last]

@@ -107,9 +107,12 @@ def _plan(readings: Readings) -> BenchPlan:
 
 
 def _set_up(readings: Readings, unknowns: tuple[str, ...]) -> Array:
-    set_up = {f"{readings.source} {name}": row for name, row in _plan(readings).setup.items()}
-    none = np.zeros((len(readings), 0))
-    return np.column_stack([none, *(set_up.get(name, none.sum(axis=1)) for name in unknowns)])
+    set_up: Mapping[str, Array] = {
+        f"{readings.source} {name}": row for name, row in _plan(readings).setup.items()
+    }
+    none = np.zeros(len(readings))
+    columns = [set_up.get(name, none) for name in unknowns]
+    return np.column_stack([np.zeros((len(none), 0)), *columns])
 
 
 def _value(option: Option, text: str, test: str) -> Any:
