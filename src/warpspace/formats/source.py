@@ -3,7 +3,7 @@
 import io
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NoReturn
 
@@ -179,9 +179,9 @@ class SourceLine:
             self.refuse(f"{quantity} in {quote(unit)}", f"one of the units {units}")
         return factors[unit]
 
-    def ascending(self, value: float, before: Sequence[float], quantity: str, of: str = "") -> None:
-        if before and value <= before[-1]:
-            self.refuse(f"{quantity} {value:g}{of} after {before[-1]:g}", "ascending positions")
+    def ascending(self, value: float, before: float, quantity: str, of: str = "") -> None:
+        if value <= before:
+            self.refuse(f"{quantity} {value:g}{of} after {before:g}", "ascending positions")
 
 
 def _joined(problem: str, expected: str) -> str:
