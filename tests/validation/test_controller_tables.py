@@ -10,7 +10,7 @@ from warpspace.formats.kinds.skew import skew_factor, skew_lengths
 from warpspace.formats.measured import BACKWARD, FORWARD
 from warpspace.formats.registry import ReadOptions, find_format, read_errors
 from warpspace.formats.source import source_of_text
-from warpspace.formats.terms import Product, trilinear
+from warpspace.formats.terms import Grid3, Product
 
 PLAIN = ReadOptions()
 
@@ -129,8 +129,9 @@ def test_fanuc_trilinear_formula_for_one_cell():
         + 4.0 * x * y * (1 - z)
         + 9.0 * x * y * z
     )
-    point = [np.array(3.0), np.array(12.0), np.array(10.0)]
-    assert trilinear(point, places, values)[0] == pytest.approx(expected, abs=1e-12)
+    grid = Grid3(("X", "Y", "Z"), places, np.broadcast_to(values, (2, 2, 2, 3)))
+    at = {"X": np.array(3.0), "Y": np.array(12.0), "Z": np.array(10.0)}
+    assert grid.corrections(at)["X"] == pytest.approx(expected, abs=1e-12)
     assert expected == pytest.approx(2.77, abs=1e-9)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -135,7 +136,7 @@ class Corrector:
         return shift, turn
 
 
-def _times(matrix: Array, vector: Array) -> Array:
+def _times(matrix: Any, vector: Array) -> Array:
     return np.einsum("...ij,...j->...i", matrix, vector)
 
 

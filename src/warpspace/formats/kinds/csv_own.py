@@ -94,7 +94,7 @@ def write(corrections: RequiredCorrections) -> Files:
     """Write the errors of a scene: constants in the main file, and one further file per axis."""
     files: dict[str, str] = {}
     for table in measured.build_error_tables(measured.sample_errors(corrections)):
-        directed = [DIRECTION] if table.directed else []
+        directed = [DIRECTION] if any(direction for _, direction, _ in table.rows) else []
         rows = [[*map(_position, table.axes), *directed, *map(_value, table.keys)]]
         for at, direction, values in table.rows:
             signs = [SIGNS[direction]] if directed else []

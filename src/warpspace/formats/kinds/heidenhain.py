@@ -13,7 +13,7 @@ import numpy as np
 from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, describe
 from warpspace.formats.source import Source, SourceLine
-from warpspace.formats.terms import HOLD_ENDS, AxisTable, Tables
+from warpspace.formats.terms import AxisTable, Tables
 from warpspace.machine.axes import TravelDirection
 from warpspace.units import Array
 
@@ -133,11 +133,9 @@ def _lines(source: Source, along: str, options: ReadOptions) -> list[AxisTable]:
                 factor * at.position(cells[BACKLASH] or cells[column], BACKLASH)
                 for at, cells in rows
             )
-        lines.append(
-            AxisTable(
-                along, target, tuple(places.tolist()), tuple(values.tolist()), HOLD_ENDS, backward
-            )
-        )
+        corrections = tuple(values.tolist())
+        table = AxisTable(along, target, tuple(places.tolist()), corrections, backward=backward)
+        lines.append(table)
     return lines
 
 

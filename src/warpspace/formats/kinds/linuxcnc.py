@@ -19,7 +19,7 @@ import numpy as np
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
 from warpspace.formats.registry import Files, Format, ReadOptions, describe, has_pattern
 from warpspace.formats.source import Source, SourceLine, format_comment, format_number, quote
-from warpspace.formats.terms import HOLD_ENDS, Affine, AxisTable, Tables
+from warpspace.formats.terms import Affine, AxisTable, Tables
 from warpspace.machine.axes import TravelDirection, is_linear
 
 MAX_ROWS = 256
@@ -148,7 +148,7 @@ def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
         trims = rows[:, :1] - rows[:, 1:] if kind == POSITIONS else rows[:, 1:]
         nominal, forward, reverse = (tuple(column.tolist()) for column in (rows[:, 0], *trims.T))
         backward = () if forward == reverse else reverse
-        terms.append(AxisTable(axis, axis, nominal, forward, HOLD_ENDS, backward))
+        terms.append(AxisTable(axis, axis, nominal, forward, backward=backward))
     if not terms:
         sources[0].refuse("names files", "the files of its COMP_FILE lines with it")
     return Tables(tuple(terms), tuple(dict.fromkeys(assumed)), tuple(notes))

@@ -24,7 +24,7 @@ from warpspace.field.grid import shares
 from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, describe, has_pattern
 from warpspace.formats.source import Source, SourceLine, format_comment, format_number, quote
-from warpspace.formats.terms import HOLD_ENDS, MODULO, AxisTable, Product, Tables, Term
+from warpspace.formats.terms import AxisTable, Product, Tables, Term
 from warpspace.machine.axes import TravelDirection
 from warpspace.units import Array
 
@@ -94,7 +94,7 @@ class AssignmentTable:
             *axes,
             tuple((start + step * np.arange(last + 1, dtype=np.float64)).tolist()),
             tuple(factor * self.values[index] for index in range(last + 1)),
-            MODULO if self.switches.get(IS_MODULO) else HOLD_ENDS,
+            is_modulo=bool(self.switches.get(IS_MODULO)),
             direction=self.switches.get("DIRECTION", 0),
         )
 

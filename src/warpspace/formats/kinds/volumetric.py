@@ -23,7 +23,13 @@ from warpspace.formats import measured
 from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.registry import Files, Format, ReadOptions, describe
 from warpspace.formats.source import Source, SourceLine, format_comment, format_number
-from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
+from warpspace.machine.axes import (
+    PARAMETERS,
+    TravelDirection,
+    direction_index,
+    is_linear,
+    parameter,
+)
 from warpspace.machine.limits import MAX_POINTS
 from warpspace.units import UM_PER_MM, URAD_PER_RAD
 
@@ -66,11 +72,22 @@ def ignored_notes(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _errors_to_write(corrections: RequiredCorrections, name: str) -> measured.ImportedErrors:
-    imported = measured.to_single_direction(measured.sample_errors(corrections), corrections)
+    """Compute the errors of a scene for its direction of travel."""
+    imported = measured.sample_errors(corrections)
     other = next((axis for axis in imported.axes if axis not in ARGUMENTS), "")
     if other:
         raise OptionError(f"{name} cannot represent axis {other}; expected {', '.join(ARGUMENTS)}")
-    return imported
+    travel = TravelDirection(corrections.scene.model.direction)
+    direction = measured.RUN_DIRECTION.get(travel, measured.UNDIRECTED)
+    series = [
+        measured.ErrorSeries.undirected(error.key, error.positions, error.in_direction(direction))
+        for error in imported.series
+    ]
+    surfaces = [
+        replace(error, values=tuple(map(tuple, error.table(direction).tolist())), backward=())
+        for error in imported.surfaces
+    ]
+    return replace(imported, series=tuple(series), surfaces=tuple(surfaces))
 
 
 def _finished(imported: measured.ImportedErrors, options: ReadOptions) -> measured.ImportedErrors:
