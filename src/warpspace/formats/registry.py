@@ -195,13 +195,11 @@ def recognise(sources: Sequence[Source]) -> Format:
         kind = next((kind for kind in formats() if kind.recognise(head, name)), None)
         if kind is None:
             names = ", ".join(kind.name for kind in formats())
-            first = next((line for line in source.lines if line.strip()), "")
-            number = source.lines.index(first) + 1 if first else None
-            problem = f"{source.at(number).quoted if number else 'nothing'} matches no known format"
-            expected = (
-                f"one of {names} (--format NAME selects it; `warpspace import --formats` lists"
-            )
-            (source.at(number) if number else source).refuse(problem, f"{expected} their contents)")
+            hint = "(--format NAME selects it; `warpspace import --formats` lists their contents)"
+            expected = f"one of {names} {hint}"
+            for at, _ in source.scan():
+                at.refuse(f"{at.quoted} matches no known format", expected)
+            source.refuse("nothing matches no known format", expected)
         recognised[kind.name] = kind
         if len(recognised) > 1:
             names = " and ".join(recognised)

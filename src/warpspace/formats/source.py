@@ -13,14 +13,22 @@ from warpspace.scene.text_files import CsvRows, one_line, parse_number
 
 UM_PER: Mapping[str, float] = {
     **dict.fromkeys(("um", "µm", "μm"), 1.0),
-    "mm": 1e3, "nm": 1e-3, "m": 1e6, "in": 25_400.0, "inch": 25_400.0,
+    "mm": 1e3,
+    "nm": 1e-3,
+    "m": 1e6,
+    "in": 25_400.0,
+    "inch": 25_400.0,
 }
 """Micrometres per unit of length."""
 URAD_PER: Mapping[str, float] = {
     **dict.fromkeys(("urad", "µrad", "μrad"), 1.0),
-    "mrad": 1e3, "rad": 1e6, "arcsec": math.pi / 180.0 / 3600.0 * 1e6,
+    "mrad": 1e3,
+    "rad": 1e6,
+    "arcsec": math.pi / 180.0 / 3600.0 * 1e6,
     **dict.fromkeys(("deg", "°"), math.pi / 180.0 * 1e6),
-    "um/m": 1.0, "µm/m": 1.0, "mm/m": 1e3,
+    "um/m": 1.0,
+    "µm/m": 1.0,
+    "mm/m": 1e3,
 }
 """Microradians per unit of angle."""
 MM_PER: Mapping[str, float] = {unit: size * 1e-3 for unit, size in UM_PER.items()}

@@ -8,13 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from warpspace.exceptions import OptionError, SceneError
-from warpspace.formats.measured import (
-    BACKWARD,
-    FORWARD,
-    ErrorSeries,
-    ErrorSurface,
-    ImportedErrors,
-)
+from warpspace.formats.measured import BACKWARD, FORWARD, ErrorSeries, ErrorSurface, ImportedErrors
 from warpspace.formats.registry import Reading
 from warpspace.kinematics.model import Model
 from warpspace.machine.axes import is_linear, parameter
@@ -104,10 +98,10 @@ def build_imported_scene(
         description=description,
     )
     text = scene_to_toml(scene)
-    if len(text.encode()) > MAX_SCENE_BYTES:
-        size = len(text.encode()) / 1e6
-        problem = f"results in a scene of {size:.1f} MB"
-        raise SceneError(name, [f"{problem}; expected at most {MAX_SCENE_BYTES / 1e6:.1f} MB"])
+    size = len(text.encode())
+    if size > MAX_SCENE_BYTES:
+        limit = f"expected at most {MAX_SCENE_BYTES / 1e6:.1f} MB"
+        raise SceneError(name, [f"results in a scene of {size / 1e6:.1f} MB; {limit}"])
     parsed = parse_scene(text, base.name, name)
     return ImportedScene(parsed, text, (*notes, *convention_notes))
 

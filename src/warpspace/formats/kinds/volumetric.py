@@ -298,11 +298,8 @@ def _write_isg(corrections: RequiredCorrections) -> Files:
         key = measured.zero_key(corrections.scene)
         blocks = [[[parameter(key).axis, key], ["0.0", "0.0"]]]
     texts = ["\n".join("\t".join(row) for row in block) for block in blocks]
-    return {
-        "": f"{format_comment('// ', corrections.scene.title)}\n// mm, rad, degrees\n"
-        + "\n#\n".join(texts)
-        + "\n"
-    }
+    head = format_comment("// ", corrections.scene.title)
+    return {"": f"{head}\n// mm, rad, degrees\n" + "\n#\n".join(texts) + "\n"}
 
 
 ISO = "iso-text"
@@ -398,18 +395,13 @@ def _write_iso(corrections: RequiredCorrections) -> Files:
     return {"": "\n".join(lines) + "\n"}
 
 
-ISO_FORMAT = Format(
-    **describe(ISO),
-    recognise=_is_iso,
-    read=_read_with(lambda source: [_read_iso(source)]),
-    write=_write_iso,
-    variants=VARIANTS,
-)
-ISG_FORMAT = Format(
-    **describe(ISG),
-    recognise=_is_isg,
-    read=_read_with(_read_isg),
-    write=_write_isg,
-    variants=VARIANTS,
-)
-FORMATS = (ISO_FORMAT, ISG_FORMAT)
+FORMATS = (
+    Format(
+        **describe(ISO), recognise=_is_iso, read=_read_with(lambda source: [_read_iso(source)]),
+        write=_write_iso, variants=VARIANTS,
+    ),
+    Format(
+        **describe(ISG), recognise=_is_isg, read=_read_with(_read_isg), write=_write_isg,
+        variants=VARIANTS,
+    ),
+)  # fmt: skip
