@@ -20,6 +20,7 @@ from warpspace.units import Array
 
 FORWARD, BACKWARD, UNDIRECTED = 1, -1, 0
 """Direction of travel of a reading; undirected where a file does not state it."""
+SIGNS = {FORWARD: "+", BACKWARD: "-", UNDIRECTED: ""}
 REPEATABILITY = 4.0  # ISO 230-2, 3.17: unidirectional repeatability in standard deviations
 Matrix = tuple[tuple[float, ...], ...]
 
@@ -219,15 +220,14 @@ def summarise_errors(imported: ImportedErrors) -> list[ErrorSummary]:
         values, reversal, repeatability = series.values, series.reversal, series.repeatability
         if repeatability is not None and np.isnan(repeatability).all():
             repeatability = None
-        directions = {run.direction for run in series.runs}
-        signs = {"+": FORWARD, "-": BACKWARD}
+        directions = {run.direction for run in series.runs if run.direction}
         rows.append(
             ErrorSummary(
                 key=series.key,
                 kind="table" if reversal is None else "by direction",
                 points=len(series.positions),
                 runs=len(series.runs),
-                directions=" ".join(sign for sign, code in signs.items() if code in directions),
+                directions=" ".join(SIGNS[code] for code in sorted(directions, reverse=True)),
                 range=(series.positions[0], series.positions[-1]),
                 smallest=float(values.min()),
                 largest=float(values.max()),

@@ -89,8 +89,7 @@ class Grid3:
     """Corrections of three axes at the points of a grid, trilinear between them."""
 
     axes: tuple[str, str, str]
-    # (3, n); ascending, of each axis
-    positions: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
+    positions: tuple[tuple[float, ...], ...]  # (3, n); ascending, of each axis
     # [n1, n2, n3, 3], mm; corrections; beyond the grid those of its boundary
     values: Array
 

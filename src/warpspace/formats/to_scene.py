@@ -8,7 +8,14 @@ from typing import TypeVar
 import numpy as np
 
 from warpspace.exceptions import OptionError, SceneError
-from warpspace.formats.measured import BACKWARD, FORWARD, ErrorSeries, ErrorSurface, ImportedErrors
+from warpspace.formats.measured import (
+    BACKWARD,
+    FORWARD,
+    SIGNS,
+    ErrorSeries,
+    ErrorSurface,
+    ImportedErrors,
+)
 from warpspace.formats.registry import Reading
 from warpspace.kinematics.model import Model
 from warpspace.machine.axes import is_linear, parameter
@@ -29,7 +36,6 @@ TRAVEL_TOLERANCE = 1e-6  # mm or degrees; tolerance of positions beyond the trav
 IMPLAUSIBLE = {False: 1000.0, True: 5000.0}
 """µm of a translation and µrad of a rotation above which a note questions the unit of the file."""
 T = TypeVar("T")
-SIGNS = {FORWARD: "+", BACKWARD: "-"}
 
 
 @dataclass(frozen=True)
@@ -229,7 +235,7 @@ def _measured(
             for run in series.runs:
                 pairs = zip(series.positions, run.values, strict=True)
                 points = tuple((q, error) for q, error in pairs if not math.isnan(error))
-                runs.append(TravelRun(SIGNS.get(run.direction, ""), points))
+                runs.append(TravelRun(SIGNS[run.direction], points))
             measured[series.key] = Measurement(tuple(runs))
     return uncertainty, measured
 

@@ -43,11 +43,12 @@ PLACED_ASSUMPTION = (
 )
 NO_OFFSETS = ", because the format cannot correct them"
 RESOLUTION = (0.0, 0.1)  # mm or degrees
-SIZES = (3, 5, 9, 17)
 MAX_TABLES = 32  # compensations of one sweep
-GRIDLESS = ("linuxcnc-matrix", "marlin")
-"""Formats without a grid in the default sweep; the skew of Klipper equals that of Marlin."""
-TABLES = ("sinumerik-enc", "sinumerik-cec", "heidenhain", "fanuc-3d", "isg-csv")
+SWEEP = (
+    *("sinumerik-enc", "sinumerik-cec", "heidenhain", "fanuc-3d", "isg-csv"),
+    *("linuxcnc-matrix", "marlin"),
+)
+"""Formats of the default sweep; the skew of Klipper equals that of Marlin."""
 MIN_CHART_UM = 1e-3  # lower end of the chart of a sweep
 Points: TypeAlias = int | tuple[tuple[str, int], ...]
 """Points of a table: one number for all axes, or one per axis."""
@@ -341,12 +342,9 @@ def compensate(
     directions: dict[str, BeforeAfter] = {}
     reversal: tuple[str, ...] = ()
     if scene.errors.has_directions:
-        forward, backward = (
-            evaluate_before_after(controller, grid, direction)
-            for direction in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
-        )
-        directions = {"forward": forward, "backward": backward}
-        reversal = reversal_notes(forward, backward, scene.errors, scene.model.direction)
+        for direction in ("forward", "backward"):
+            directions[direction] = evaluate_before_after(controller, grid, direction)
+        reversal = reversal_notes(directions, scene.errors, scene.model.direction)
         check_cancelled()
     return Compensation(
         comparison.before, comparison.after, grid, comparison.field_uncertainty, kind, files,
@@ -464,11 +462,11 @@ class Sweep(Result):
 
 
 def sweep(scene: Scene, options: Compensate) -> Sweep:
-    names = list(dict.fromkeys(options.formats)) or [*TABLES, *GRIDLESS]
+    names = list(dict.fromkeys(options.formats)) or [*SWEEP]
     tables: list[tuple[str, int]] = []
     for name in names:
-        kind, sizes = find_format(name), options.sweep or SIZES
-        counts = [count for count in sizes if 2 <= count <= kind.most_points]
+        kind = find_format(name)
+        counts = [count for count in options.sweep if count <= kind.most_points]
         if not kind.has_grid:
             counts = [0]
         tables += [(name, count) for count in counts]

@@ -1,5 +1,6 @@
 """A controller with a compensation table: its corrections and the residual error."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -156,28 +157,26 @@ def read_back(
             " parameters is fixed; expected a table of corrections"
         )
     model = replace(imported_scene.model, direction=scene.model.direction)
-    notes = list(imported.notes)
     lost = [key for key in scene.errors if key not in errors and scene.errors.amplitude(key)]
-    if lost:
-        notes.append(f"the format cannot represent {', '.join(lost)}")
     partly = [
         key
         for key in scene.errors
         if key in errors and set(scene.errors.arguments(key)) - set(errors.arguments(key))
     ]
-    if partly:
-        notes.append(f"the format represents {', '.join(partly)} over fewer axes than the scene")
     differing = [
         axis
         for axis in scene.machine.axes
         if model.convention(axis).name != scene.model.convention(axis).name
     ]
-    if differing:
-        notes.append(f"the format uses a different convention for errors of {', '.join(differing)}")
+    limits = {
+        "cannot represent {}": lost,
+        "represents {} over fewer axes than the scene": partly,
+        "uses a different convention for errors of {}": differing,
+    }
+    notes = [f"the format {text.format(', '.join(of))}" for text, of in limits.items() if of]
     corrector = replace(corrector, model=model, errors=errors)
-    return Controller(
-        scene, corrector.loop, label, corrector, None, imported.size, imported.assumed, tuple(notes)
-    )
+    stated = (imported.size, imported.assumed, (*imported.notes, *notes))
+    return Controller(scene, corrector.loop, label, corrector, None, *stated)
 
 
 MAX_REVERSAL_SHARE = 0.05
@@ -225,8 +224,9 @@ def evaluate_before_after(controller: Controller, grid: Grid, direction: str) ->
 
 
 def reversal_notes(
-    forward: BeforeAfter, backward: BeforeAfter, errors: ErrorSet, direction: str
+    directions: Mapping[str, BeforeAfter], errors: ErrorSet, direction: str
 ) -> tuple[str, ...]:
+    forward, backward = directions["forward"], directions["backward"]
     before, after = (
         float((first - second).norm_um.max())
         for first, second in ((forward.before, backward.before), (forward.after, backward.after))

@@ -29,7 +29,6 @@ from warpspace.scene.text_files import CsvRows, unguard_cell
 from warpspace.units import Array
 
 RUN, DIRECTION = "run", "direction"
-SIGNS = {measured.FORWARD: "+", measured.BACKWARD: "-", measured.UNDIRECTED: ""}
 DIGITS = 6  # decimals of a value, µm or µrad
 UNITS = "# Units are in brackets and may be changed: um mm nm in, urad mrad rad arcsec deg."
 
@@ -97,7 +96,7 @@ def write(corrections: RequiredCorrections) -> Files:
         directed = [DIRECTION] if any(direction for _, direction, _ in table.rows) else []
         rows = [[*map(_position, table.axes), *directed, *map(_value, table.keys)]]
         for at, direction, values in table.rows:
-            signs = [SIGNS[direction]] if directed else []
+            signs = [measured.SIGNS[direction]] if directed else []
             numbers = [format_number(number, DIGITS) for number in values]
             rows.append([*map(repr, at), *signs, *numbers])
         name = ("constant", *table.axes[:1], table.keys[0])[len(table.axes)]
