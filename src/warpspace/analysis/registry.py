@@ -1,14 +1,15 @@
-"""Registry of the analyses: one line here, one file each; plug-ins register theirs.
+"""Registries of analyses, one line here, one file each, and of publications; plug-ins add theirs.
 
 Analyses are imported when they are used, so that the list costs no start-up time.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 from warpspace.exceptions import UnknownNameError
-from warpspace.plugins import load_plugins
+from warpspace.plugins import Registry, load_plugins
 
 if TYPE_CHECKING:
     from warpspace.analysis.description import Analysis, ProgressCallback, Result, Task
@@ -127,18 +128,37 @@ def verb(name: str) -> "Verb[Result]":
 
     kind = find_analysis(name)
     names = [option.name for option in options_of(kind)]
-    run_names = [*(kind.run_all.__kwdefaults__ or {})]
 
     def run(
         *scenes: "Scene", watch: "ProgressCallback" = ignore_progress, **options: Any
     ) -> "Result":
         for key in options:
-            if key not in names and key not in run_names:
-                raise UnknownNameError(f"option of {name}", key, [*names, *run_names])
-        analysis = kind(**{key: options[key] for key in options if key in names})
-        arguments = {key: options[key] for key in options if key in run_names}
-        return analysis.run_all(scenes, watch, **arguments)
+            if key not in (*names, *kind.run_options):
+                raise UnknownNameError(f"option of {name}", key, [*names, *kind.run_options])
+        arguments = {key: options.pop(key) for key in kind.run_options if key in options}
+        return kind(**options).run_all(scenes, watch, **arguments)
 
     run.__name__ = run.__qualname__ = name
     run.__doc__ = kind.__doc__
     return run
+
+
+class PrintedNumber(NamedTuple):
+    """A number of a publication, and the phrase that quotes it."""
+
+    value_um: float
+    quotation: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Publication:
+    """Numbers that a publication gives; each function returns nothing for other machines."""
+
+    name: str  # heading of a column, mark of a chart, start of a key of a CSV file
+    key_errors: Callable[[str], tuple[str, ...]]  # key errors of a machine by its name
+    # mean |E| of machines within the tolerances of a scene, at one random point each, of a loop
+    sampled_mean: "Callable[[Scene, str], PrintedNumber | None]"
+    measured_error: "Callable[[Scene], PrintedNumber | None]"  # volumetric error of a machine
+
+
+PUBLICATIONS: Registry[Publication] = Registry("publication", {})

@@ -12,7 +12,7 @@ from warpspace.analysis.blocks import Table
 from warpspace.analysis.commands.concepts import Concepts, compare_concepts, expected_um
 from warpspace.analysis.commands.contributions import explain
 from warpspace.analysis.commands.gains import Gain, gains_at, gains_max, mark_key_errors
-from warpspace.analysis.publications import PUBLICATIONS, Publication
+from warpspace.analysis.registry import PUBLICATIONS, Publication
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.field.evaluate import View
 from warpspace.field.grid import build_grid

@@ -21,7 +21,6 @@ from warpspace.analysis.sampling.cases import (
     Case,
     Cylinder,
     SamplingPlan,
-    Site,
     both_orders,
     choose_cylinder,
 )
@@ -30,8 +29,8 @@ from warpspace.analysis.sampling.machine_sampling import (
     montecarlo_each,
     run_in_order,
     sample_chunks,
+    scene_draws,
 )
-from warpspace.analysis.sampling.sampling_options import scene_draws
 from warpspace.exceptions import OptionError, SceneError, WorkersLostError
 from warpspace.field.evaluate import SecondOrder, View, compare_orders
 from warpspace.kinematics.chain import branch_pose
@@ -95,8 +94,7 @@ def test_a_failing_or_interrupted_chunk_ends_the_run():
 )
 def test_both_orders_are_those_of_the_same_machines(loop, over, reference):
     scene = dataclasses.replace(SCENE, reference=reference)
-    drawn = warpspace.montecarlo(scene, samples=300, seed=4, loop=loop, over=over)
-    case = Case(scene.model, drawn.draws, scene.workspace, drawn.view, drawn.plan)
+    case = warpspace.montecarlo(scene, samples=300, seed=4, loop=loop, over=over).case
     first, exact = both_orders(case, 300)
     worst = np.linalg.norm(first, axis=-1).max(axis=-1)
     np.testing.assert_allclose(worst, case.build_job()(*case.plan.block(0))[: len(worst)])
@@ -113,13 +111,13 @@ def test_the_second_order_matters_above_a_tenth_or_one_per_cent(um, largest_um, 
     assert SecondOrder(um, largest_um).matters == matters
 
 
-def case(**plan):
-    draws = scene_draws(SCENE, Loop.TOOL, "uniform", clip=False)
-    return Case(SCENE.model, draws, SCENE.workspace, View(), SamplingPlan(**plan))
+def case(loop=Loop.TOOL, **plan):
+    draws = scene_draws(SCENE, loop, "uniform", clip=False)
+    return Case(SCENE.model, draws, SCENE.workspace, View(loop), SamplingPlan(**plan))
 
 
 def numbers(found):
-    names = {field.name for field in dataclasses.fields(found)} - {"plan", "draws", "histogram"}
+    names = {field.name for field in dataclasses.fields(found)} - {"case", "histogram"}
     return (*(getattr(found, name) for name in sorted(names)), *found.histogram.counts.tolist())
 
 
@@ -267,7 +265,7 @@ def test_workpiece_points_fill_the_cylinder_uniformly():
     size = choose_cylinder(SCENE.model)
     assert size == Cylinder(550.0, 450.0)
     rng = np.random.default_rng(1)
-    places = Site(SCENE.model, SCENE.workspace, Loop.WORKPIECE, size).random(rng, 50_000)
+    places = case(Loop.WORKPIECE).random(rng, 50_000)
     pose = branch_pose(SCENE.model, "workpiece", places.coordinates)
     x, y, z = apply(inverse(pose), places.point_mm).T
     radius = np.hypot(x, y)
@@ -282,7 +280,7 @@ def test_workpiece_points_fill_the_cylinder_uniformly():
 
 @pytest.mark.parametrize("loop", list(Loop))
 def test_places_have_one_point_per_node(loop):
-    site = Site(SCENE.model, SCENE.workspace, loop)
+    site = case(loop)
     spread = site.spread(5)
     assert spread.point_mm.reshape(-1, 3).shape == (125, 3)
     extreme = site.extreme(5)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import warpspace
-from warpspace.analysis.statistics import statistics, volume_statistics
-from warpspace.analysis.tolerance_check import Check, check_errors, shear
+from warpspace.analysis.statistics import Check, check_errors, shear, statistics, volume_statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField
 from warpspace.field.grid import build_grid

@@ -14,8 +14,7 @@ from warpspace.analysis.options import Grammar, option, read_keys, read_numbers
 from warpspace.analysis.sampling import tolerance_search
 from warpspace.analysis.sampling.cases import Case, Reduction, both_orders
 from warpspace.analysis.sampling.distribution import Draws, Probability, machines_needed
-from warpspace.analysis.sampling.machine_sampling import montecarlo, sample_chunks
-from warpspace.analysis.sampling.sampling_options import KeptLimit
+from warpspace.analysis.sampling.machine_sampling import KeptLimit, montecarlo, sample_chunks
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.field.evaluate import compare_orders
 from warpspace.machine.axes import parameter
@@ -260,7 +259,7 @@ def allocate(
 
     def probability(half: Array, share: float) -> Probability:
         drawn = replace(case, draws=replace(draws, half_width=half))
-        result = montecarlo(drawn, lambda count: report(share * count / plan.samples))
+        result = montecarlo(drawn, progress=lambda n: report(share * n / plan.samples))
         assert result.probability is not None  # noqa: S101 - the plan has a limit
         return result.probability
 
@@ -350,7 +349,7 @@ def _new_scales(
             move = amplitudes - base
             if common is not None:
                 return tolerance_search.scales_within(base @ common, move @ common, limit_um)
-            gains = case.responses(case.site.random(rng, count))
+            gains = case.responses(case.random(rng, count))
             base_um = np.einsum("nk,ckn->cn", base, gains)
             return tolerance_search.scales_within(
                 base_um, np.einsum("nk,ckn->cn", move, gains), limit_um

@@ -16,8 +16,12 @@ from warpspace.analysis.commands.contributions import (
 from warpspace.analysis.commands.montecarlo import sampled_second_order
 from warpspace.analysis.description import ProgressCallback, Result, count_progress
 from warpspace.analysis.options import option
-from warpspace.analysis.sampling.machine_sampling import Progress, SampleStatistics, montecarlo
-from warpspace.analysis.sampling.sampling_options import KeptLimit
+from warpspace.analysis.sampling.machine_sampling import (
+    KeptLimit,
+    Progress,
+    SampleStatistics,
+    montecarlo,
+)
 from warpspace.exceptions import SceneError
 from warpspace.field.evaluate import build_basis
 from warpspace.field.grid import Grid
@@ -111,7 +115,7 @@ class Concepts(KeptLimit):
     def run_all(self, scenes: Sequence[Scene], watch: ProgressCallback, /) -> "ConceptsResult":
         progress = count_progress(watch, self.samples * len(scenes))
         concepts = compare_concepts(scenes, self, progress=progress)
-        left_out = sampled_second_order(*((concept.scene, concept.sampled) for concept in concepts))
+        left_out = sampled_second_order(*(concept.sampled for concept in concepts))
         return ConceptsResult(analysis=self, concepts=concepts, second_order=left_out)
 
 
@@ -177,7 +181,7 @@ class ConceptsResult(Result):
             scene.name,
             scene.title,
             str(scene.machine.chain),
-            str(sampled.view.loop),
+            str(sampled.case.view.loop),
             *(sampled.mean_um, sampled.p95_um, sampled.max_um),
             None if probability is None else probability.spec_um,
             None if probability is None else probability.probability,
@@ -203,7 +207,8 @@ def compare_concepts(
                 f"tolerances: none of the {analysis.loop} loop has a width; expected one above 0"
             )
             raise SceneError(scene.name, [problem])
-        concepts.append(Concept(scene, montecarlo(case, progress), variance_contributions(case)))
+        sampled = montecarlo(case, progress=progress)
+        concepts.append(Concept(scene, sampled, variance_contributions(case)))
     return tuple(concepts)
 
 
@@ -229,9 +234,9 @@ def with_equal_tolerances(
 
 def expected_um(concept: Concept, grid: Grid) -> Array:
     """Compute the RMS of |E| of machines within tolerance at each node, [nx, ny, nz], µm."""
-    draws, view = concept.sampled.draws, concept.sampled.view
+    case, draws = concept.sampled.case, concept.sampled.case.draws
     basis = build_basis(
-        concept.scene.model, ErrorSet(), draws.keys, grid.coordinates, view, grid.point_mm
+        case.model, ErrorSet(), draws.keys, grid.coordinates, case.view, grid.point_mm
     )
     square = np.einsum("k,k...c->...", draws.variance, basis.position**2)
     middle = np.einsum("k,k...c->...c", draws.centre, basis.position)

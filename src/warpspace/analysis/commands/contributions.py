@@ -18,7 +18,7 @@ from warpspace.analysis.blocks import (
 from warpspace.analysis.description import ProgressCallback, Result
 from warpspace.analysis.options import error_words, option
 from warpspace.analysis.sampling.cases import Case, Reduction, SamplingPlan, reduce_nodes
-from warpspace.analysis.sampling.sampling_options import Sampled
+from warpspace.analysis.sampling.machine_sampling import Sampled
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, amplitudes_of, build_basis, error_values, evaluate_exact
 from warpspace.kinematics.chain import columns, nominal_point
@@ -66,7 +66,7 @@ def expected_square(case: Case) -> tuple[Array, float]:
 
 
 def _average_gains(case: Case) -> Array:
-    return case.responses(case.site.average())
+    return case.responses(case.average())
 
 
 def variance_contributions(case: Case, sobol: int | None = None) -> "ContributionsResult":

@@ -13,7 +13,7 @@ from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table,
 from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.options import AT_HELP, LOOP_HELP, Place, error_words, option, place_words
-from warpspace.analysis.publications import PUBLICATIONS
+from warpspace.analysis.registry import PUBLICATIONS
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import JacobianColumn as Response

@@ -96,7 +96,7 @@ def build_ensemble(case: Case) -> Ensemble:
     unit = np.concatenate([draws.draw(*block) for block in blocks]).astype(np.float32)
     if plan.reduction == Reduction.SAMPLED:
         parts = [
-            np.broadcast_to(case.responses(case.site.random(*block)), (3, len(keys), block[1]))
+            np.broadcast_to(case.responses(case.random(*block)), (3, len(keys), block[1]))
             for block in blocks
         ]
         stacked = np.concatenate(parts, axis=2).astype(np.float32)
