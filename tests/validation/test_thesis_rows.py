@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import warpspace
-from warpspace.thesis_example.presentation import markdown_page
+from warpspace.thesis_example.rows import markdown_page
 
 # What the print and the model cannot agree on; each has a sentence why.
 DISAGREE = {
