@@ -254,7 +254,7 @@ def test_an_option_is_described_once():
 def test_an_analysis_of_ones_own_is_a_command_like_any_other(tmp_path):
     register(Even)
     try:
-        with pytest.raises(ValueError, match="already registered"):
+        with pytest.raises(OptionError, match="already registered"):
             register(Even)
         (entry,) = (one for one in entries() if one.name == "even")
         command = guarded(command_of(entry.load()))
