@@ -1,7 +1,7 @@
 """Allocation of tolerances: the widest that keep a limit of |E| with a required probability."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import Change, ProgressCallback, Result, count_progress
+from warpspace.analysis.description import (
+    Change,
+    ProgressCallback,
+    Result,
+    count_progress,
+    ignore_progress,
+)
 from warpspace.analysis.options import Grammar, option, read_keys, read_numbers
 from warpspace.analysis.sampling import tolerance_search
 from warpspace.analysis.sampling.cases import Case, Reduction, both_orders
@@ -30,8 +36,6 @@ TRIES, NARROWER = 5, 0.99
 EXACT_MACHINES = 2000  # machines of which the answer is verified with the exact chain
 SEARCHED, WIDENED, CHECKED = 0.4, 0.2, 0.4
 """Shares of the work: the search, the scale on new machines, the checks before and after."""
-Progress = Callable[[float], object]
-"""Called with the share of the work that was done since the last call."""
 
 
 def read_costs(text: str, _scene: Scene) -> tuple[tuple[str, float], ...]:
@@ -222,10 +226,13 @@ class AllocateResult(Result):
 def allocate(
     case: Case,
     analysis: Allocate,
-    report: Progress = lambda _: None,
+    advance: ProgressCallback = ignore_progress,
     widest: float = MAX_HALF_WIDTH,
 ) -> AllocateResult:
-    """Find the tolerances of least cost that keep a limit with a probability."""
+    """Find the tolerances of least cost that keep a limit with a probability.
+
+    `advance` is called with the share of the work that was done since its last call.
+    """
     analysis.check_keys(case.model.machine.allowed_keys)
     draws, plan = case.draws, replace(case.plan, spec_um=analysis.limit_um)
     plan.check()
@@ -250,16 +257,16 @@ def allocate(
 
     def step() -> None:
         steps.append(None)
-        report(SEARCHED / tolerance_search.MOST_STEPS)
+        advance(SEARCHED / tolerance_search.MOST_STEPS)
 
     widths = tolerance_search.search_widths(task, step)
-    report(SEARCHED * (1.0 - len(steps) / tolerance_search.MOST_STEPS))
-    scale = _new_scales(case, analysis.limit_um, needed / plan.samples, report)
+    advance(SEARCHED * (1.0 - len(steps) / tolerance_search.MOST_STEPS))
+    scale = _new_scales(case, analysis.limit_um, needed / plan.samples, advance)
     widths = None if widths is None else tolerance_search.scaled(task, widths, scale)
 
     def probability(half: Array, share: float) -> Probability:
         drawn = replace(case, draws=replace(draws, half_width=half))
-        result = montecarlo(drawn, progress=lambda n: report(share * n / plan.samples))
+        result = montecarlo(drawn, progress=lambda n: advance(share * n / plan.samples))
         assert result.probability is not None  # noqa: S101 - the plan has a limit
         return result.probability
 
@@ -334,7 +341,7 @@ def _task(
 
 
 def _new_scales(
-    case: Case, limit_um: float, share: float, report: Progress
+    case: Case, limit_um: float, share: float, advance: ProgressCallback
 ) -> tolerance_search.ScaleOf:
     draws, common = case.draws, None
     if case.plan.reduction == Reduction.MAX:
@@ -358,7 +365,7 @@ def _new_scales(
         scales: list[Array] = []
         for part in sample_chunks(chunk, case.plan):
             scales.append(part)
-            report(WIDENED * len(part) / case.plan.samples)
+            advance(WIDENED * len(part) / case.plan.samples)
         return tolerance_search.largest_scale(np.concatenate(scales), share)
 
     return scale

@@ -52,7 +52,7 @@ class Concept:
 
     @property
     def json_fields(self) -> dict[str, Any]:
-        sampled, probability = self.sampled, self.sampled.probability
+        sampled = self.sampled
         return {
             "scene": self.scene.name,
             "title": self.scene.title,
@@ -60,9 +60,7 @@ class Concept:
             "mean_um": sampled.mean_um,
             "p95_um": sampled.p95_um,
             "max_um": sampled.max_um,
-            "probability": None if probability is None else probability.probability,
-            "low": None if probability is None else probability.low,
-            "high": None if probability is None else probability.high,
+            **dict(zip(("probability", "low", "high"), sampled.interval, strict=True)),
             "rms_um": self.shares.rms_um,
             "errors": [
                 {
@@ -174,7 +172,7 @@ class ConceptsResult(Result):
         )
 
     def _row(self, letter: str, concept: Concept) -> tuple[Any, ...]:
-        sampled, probability, scene = concept.sampled, concept.sampled.probability, concept.scene
+        sampled, scene, share = concept.sampled, concept.scene, concept.sampled.interval[0]
         leading = [value for row in concept.leading for value in (row.key, row.share)]
         return (
             letter,
@@ -183,9 +181,9 @@ class ConceptsResult(Result):
             str(scene.machine.chain),
             str(sampled.case.view.loop),
             *(sampled.mean_um, sampled.p95_um, sampled.max_um),
-            None if probability is None else probability.spec_um,
-            None if probability is None else probability.probability,
-            None if probability is None else 100.0 * probability.probability,
+            sampled.case.plan.spec_um,
+            share,
+            None if share is None else 100.0 * share,
             ", ".join(f"{row.key} {100.0 * row.share:.0f} %" for row in concept.leading),
             *leading,
             *[None] * (2 * NAMED - len(leading)),
@@ -212,9 +210,7 @@ def compare_concepts(
     return tuple(concepts)
 
 
-def with_equal_tolerances(
-    scenes: Sequence[Scene], *, own_tolerances: bool = False
-) -> tuple[Scene, ...]:
+def with_equal_tolerances(scenes: Sequence[Scene], *, own_tolerances: bool) -> tuple[Scene, ...]:
     """Return scenes, errors absolute, with the tolerances of the first one by class."""
     absolute = [replace(scene, reference=None, placed=False) for scene in scenes]
     if own_tolerances or not scenes:

@@ -85,18 +85,17 @@ class SweepPoint:
 
     @property
     def row(self) -> dict[str, Any]:
-        sampled, probability = self.sampled, self.sampled.probability
+        sampled, plan = self.sampled, self.sampled.case.plan
+        names = "probability", "probability_low", "probability_high"
         return {
             "scene": self.scene.name,
             "title": self.scene.title,
             **self.half_widths,
-            "samples": sampled.case.plan.samples,
-            "seed": sampled.case.plan.seed,
+            "samples": plan.samples,
+            "seed": plan.seed,
             **{name: getattr(sampled, name) for name in NUMBERS.values()},
-            "spec_um": None if probability is None else probability.spec_um,
-            "probability": None if probability is None else probability.probability,
-            "probability_low": None if probability is None else probability.low,
-            "probability_high": None if probability is None else probability.high,
+            "spec_um": plan.spec_um,
+            **dict(zip(names, sampled.interval, strict=True)),
         }
 
 

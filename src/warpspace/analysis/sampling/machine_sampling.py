@@ -62,6 +62,12 @@ class SampleStatistics(Summary):
     # false beyond a million samples: quantiles are then good to 0.002 % of their value
     exact_quantiles: bool
 
+    @property
+    def interval(self) -> tuple[float | None, float | None, float | None]:
+        """Probability and both ends of its interval; None without a specification."""
+        share = self.probability
+        return (share.probability, share.low, share.high) if share else (None, None, None)
+
 
 class Execution(TypedDict, total=False):
     """Workers of a run, and who is informed of its progress; see `sweep`."""
