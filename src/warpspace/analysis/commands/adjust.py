@@ -7,25 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from warpspace.analysis import description
 from warpspace.analysis.adjustment_search import Objective, Search, Volume
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
-from warpspace.analysis.description import (
-    Analysis,
-    Change,
-    ExpandedUncertainty,
-    ProgressCallback,
-    Result,
-    ignore_progress,
-)
 from warpspace.analysis.options import ALL, LOOP_HELP, PLACED_HELP, Keys, Limits, option
 from warpspace.analysis.statistics import Summary, volume_statistics
-from warpspace.analysis.uncertainty.propagation import (
-    FieldUncertainty,
-    field_uncertainty,
-    plus_minus,
-    scene_uncertainty,
-    u95_lines,
-)
+from warpspace.analysis.uncertainty import propagation
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorBasis, amplitudes_of, placed_words
 from warpspace.field.grid import DEFAULT_NODES, build_grid
@@ -60,8 +47,8 @@ class Effect:
     present: float  # µm or µrad
     left_out: Summary
     best: Best
-    expanded_uncertainty: ExpandedUncertainty[float | None] = attribute(
-        default_factory=ExpandedUncertainty[float | None]
+    expanded_uncertainty: description.ExpandedUncertainty[float | None] = attribute(
+        default_factory=description.ExpandedUncertainty[float | None]
     )
 
     @property
@@ -86,7 +73,7 @@ class AdjustedSet(Summary):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Adjust(Analysis):
+class Adjust(description.Analysis):
     """Find which errors of SCENE to adjust, and to what.
 
     For each error stands what leaving it out, and what its best value, gives for the whole volume
@@ -136,7 +123,9 @@ class Adjust(Analysis):
     def evaluated_loop(self) -> Loop:
         return self.loop or (Loop.RELATIVE if self.placed else Loop.TOOL)
 
-    def run(self, scene: Scene, watch: ProgressCallback = ignore_progress, /) -> "AdjustResult":
+    def run(
+        self, scene: Scene, watch: description.ProgressCallback = description.ignore_progress, /
+    ) -> "AdjustResult":
         if self.placed and self.evaluated_loop is not Loop.RELATIVE:
             raise OptionError(
                 f"{{placed}}: the {self.loop} loop does not contain the placement of the workpiece;"
@@ -181,7 +170,7 @@ class Adjust(Analysis):
         )
         error = basis.evaluate(amplitudes, orientation=False).error_um
         at = grid.coordinates, view, grid.point_mm, grid.weights
-        uncertainty = field_uncertainty(scene, error, *at)
+        uncertainty = propagation.field_uncertainty(scene, error, *at)
         return result if uncertainty is None else _with_uncertainty(result, uncertainty, basis)
 
     def included(self, scene: Scene) -> Sequence[str]:
@@ -194,7 +183,7 @@ class Adjust(Analysis):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AdjustResult(Result):
+class AdjustResult(description.Result):
     """Adjustments of a machine."""
 
     json_keys = ("objective", "before", "errors", "adjustable", "adjustments", "all_sets_compared")
@@ -218,9 +207,9 @@ class AdjustResult(Result):
     def all_sets_compared(self) -> list[bool]:
         return [adjusted.proven for adjusted in self.adjustments]
 
-    def changes(self) -> Sequence[Change]:
+    def changes(self) -> Sequence[description.Change]:
         return [
-            Change(
+            description.Change(
                 f"after adjustment: {_values(adjusted)}",
                 apply_adjustments(self.scene, adjusted.adjust),
             )
@@ -232,8 +221,8 @@ class AdjustResult(Result):
         yield " · ".join((self.scene.title, *self._where, smallest))
         mean, rms, p95, largest = (f"{getattr(self.before, name):.2f}" for name in FOUR)
         yield f"  before: mean {mean}, RMS {rms}, P95 {p95}, max {largest} µm"
-        uncertainty = scene_uncertainty(self.scene, self.analysis.evaluated_loop)
-        yield from u95_lines(uncertainty, {"": self.before})
+        uncertainty = propagation.scene_uncertainty(self.scene, self.analysis.evaluated_loop)
+        yield from propagation.u95_lines(uncertainty, {"": self.before})
         columns = (
             Column("key", leads=True),
             Column("now", ".4g"),
@@ -263,7 +252,7 @@ class AdjustResult(Result):
         for effect in self.errors:
             probability = effect.best.expanded_uncertainty.get("probability")
             if probability is not None:
-                u95 = plus_minus(effect.expanded_uncertainty["u95_present"], ".3g")
+                u95 = propagation.plus_minus(effect.expanded_uncertainty["u95_present"], ".3g")
                 yield (
                     f"  {effect.key} {effect.present:.4g} {u95} {effect.unit}: best value"
                     f" {effect.best.value:.1f} improves with probability {probability:.1%}"
@@ -366,9 +355,9 @@ def apply_adjustments(scene: Scene, adjust: Mapping[str, float]) -> Scene:
 
 
 def _with_uncertainty(
-    result: AdjustResult, before: FieldUncertainty, basis: ErrorBasis
+    result: AdjustResult, before: propagation.FieldUncertainty, basis: ErrorBasis
 ) -> AdjustResult:
-    def u95_after(adjust: Mapping[str, float]) -> ExpandedUncertainty[float | None]:
+    def u95_after(adjust: Mapping[str, float]) -> description.ExpandedUncertainty[float | None]:
         values = amplitudes_of(apply_adjustments(result.scene, adjust).errors, basis.keys)
         after = replace(before, error_um=basis.evaluate(values, orientation=False).error_um)
         u95 = after.with_expanded_uncertainty(result.before).expanded_uncertainty
@@ -379,7 +368,7 @@ def _with_uncertainty(
 
     def effect_with_u95(effect: Effect) -> Effect:
         best = replace(effect.best, expanded_uncertainty=u95_after({effect.key: effect.best.value}))
-        present = ExpandedUncertainty(u95_present=before.errors.u95_of(effect.key))
+        present = description.ExpandedUncertainty(u95_present=before.errors.u95_of(effect.key))
         return replace(effect, best=best, expanded_uncertainty=present)
 
     return replace(

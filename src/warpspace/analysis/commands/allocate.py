@@ -8,14 +8,8 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from warpspace.analysis import description
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import (
-    Change,
-    ProgressCallback,
-    Result,
-    count_progress,
-    ignore_progress,
-)
 from warpspace.analysis.options import Grammar, option, read_keys, read_numbers
 from warpspace.analysis.sampling import tolerance_search
 from warpspace.analysis.sampling.cases import Case, Reduction, both_orders
@@ -88,9 +82,9 @@ class Allocate(KeptLimit):
     )
     fixed: Fixed = option((), "Errors whose tolerance stays unchanged")
 
-    def run(self, scene: Scene, watch: ProgressCallback, /) -> "AllocateResult":
+    def run(self, scene: Scene, watch: description.ProgressCallback, /) -> "AllocateResult":
         case = self.case(scene, self.plan_of(self.limit_um))
-        return replace(allocate(case, self, count_progress(watch, 1.0)), scene=scene)
+        return replace(allocate(case, self, description.count_progress(watch, 1.0)), scene=scene)
 
     def check_keys(self, allowed: Sequence[str]) -> None:
         for key in (*dict(self.costs), *self.fixed):
@@ -122,7 +116,7 @@ class Exact(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AllocateResult(Result):
+class AllocateResult(description.Result):
     """Allocated tolerances, and the probability that the limit is kept."""
 
     analysis: Allocate
@@ -172,11 +166,13 @@ class AllocateResult(Result):
             "exact": self.exact._asdict(),
         }
 
-    def changes(self) -> Sequence[Change]:
+    def changes(self) -> Sequence[description.Change]:
         if self.scene is None:
             return ()
         tolerances = self.scene.tolerances.with_half_widths(self.tolerances)
-        return [Change("tolerances allocated", replace(self.scene, tolerances=tolerances))]
+        return [
+            description.Change("tolerances allocated", replace(self.scene, tolerances=tolerances))
+        ]
 
     def blocks(self) -> Iterator[Block]:
         analysis, draws = self.analysis, self.draws
@@ -226,7 +222,7 @@ class AllocateResult(Result):
 def allocate(
     case: Case,
     analysis: Allocate,
-    advance: ProgressCallback = ignore_progress,
+    advance: description.ProgressCallback = description.ignore_progress,
     widest: float = MAX_HALF_WIDTH,
 ) -> AllocateResult:
     """Find the tolerances of least cost that keep a limit with a probability.
@@ -341,7 +337,7 @@ def _task(
 
 
 def _new_scales(
-    case: Case, limit_um: float, share: float, advance: ProgressCallback
+    case: Case, limit_um: float, share: float, advance: description.ProgressCallback
 ) -> tolerance_search.ScaleOf:
     draws, common = case.draws, None
     if case.plan.reduction == Reduction.MAX:

@@ -16,12 +16,7 @@ from warpspace.analysis.commands.contributions import (
 from warpspace.analysis.commands.montecarlo import sampled_second_order
 from warpspace.analysis.description import ProgressCallback, Result, count_progress
 from warpspace.analysis.options import option
-from warpspace.analysis.sampling.machine_sampling import (
-    KeptLimit,
-    Progress,
-    SampleStatistics,
-    montecarlo,
-)
+from warpspace.analysis.sampling import machine_sampling
 from warpspace.exceptions import SceneError
 from warpspace.field.evaluate import build_basis
 from warpspace.field.grid import Grid
@@ -42,7 +37,7 @@ class Concept:
     """One machine of a comparison."""
 
     scene: Scene  # with the tolerances that were taken, its errors absolute
-    sampled: SampleStatistics  # |E| of machines within tolerance
+    sampled: machine_sampling.SampleStatistics  # |E| of machines within tolerance
     # what each tolerance adds to the variance of E, the largest first
     shares: ContributionsResult
 
@@ -76,7 +71,7 @@ class Concept:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Concepts(KeptLimit):
+class Concepts(machine_sampling.KeptLimit):
     """Compare machines before one of them is built.
 
     Machines of each SCENE are drawn from the same tolerances: those of the first one for
@@ -194,7 +189,7 @@ def compare_concepts(
     scenes: Sequence[Scene],
     analysis: Concepts | None = None,
     *,
-    progress: Progress | None = None,
+    progress: machine_sampling.Progress | None = None,
 ) -> tuple[Concept, ...]:
     analysis = analysis or Concepts()
     concepts: list[Concept] = []
@@ -205,7 +200,7 @@ def compare_concepts(
                 f"tolerances: none of the {analysis.loop} loop has a width; expected one above 0"
             )
             raise SceneError(scene.name, [problem])
-        sampled = montecarlo(case, progress=progress)
+        sampled = machine_sampling.montecarlo(case, progress=progress)
         concepts.append(Concept(scene, sampled, variance_contributions(case)))
     return tuple(concepts)
 
