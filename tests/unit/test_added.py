@@ -4,7 +4,6 @@ import io
 import zipfile
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -54,10 +53,9 @@ SPLIT = 'machine = "dvf5000"\n[convention]\ncomponent_errors = "split"\n[errors]
 class HalfSine(ErrorFunction):
     """Zero at both ends of the span, the value in the middle."""
 
-    name: ClassVar[str] = "half_sine"
-    title: ClassVar[str] = "half sine"
-    forms: ClassVar[tuple[tuple[str, ...], ...]] = (("half_sine",),)
-    row_words: ClassVar[str] = "one number: the value in the middle"
+    name, title = "half_sine", "half sine"
+    forms = (("half_sine",),)
+    row_words = "one number: the value in the middle"
     value: float = 0.0
 
     def evaluate(self, position):
@@ -95,10 +93,9 @@ class HalfSine(ErrorFunction):
 class Split(kinematics.Convention):
     """``Trans(δ) · Motion · Rot(ε)``: shifts in fixed directions, turns on the moving body."""
 
-    name: ClassVar[str] = "split"
-    title: ClassVar[str] = "shifts before, turns after motion"
-    place: ClassVar[str] = "on both sides of the motion"
-    meaning: ClassVar[str] = "shift in fixed directions and turn with the moving body"
+    name, title = "split", "shifts before, turns after motion"
+    place = "on both sides of the motion"
+    meaning = "shift in fixed directions and turn with the moving body"
 
     def factors(self, constant, motion, component):
         if component is None:
@@ -115,11 +112,9 @@ class Split(kinematics.Convention):
 
 @dataclass(frozen=True, kw_only=True)
 class Corner(base.BenchTest):
-    name: ClassVar[str] = "corner"
-    title: ClassVar[str] = "Corner"
-    standard: ClassVar[str] = "our own"
-    description: ClassVar[str] = "A dial gauge looks along x."
-    columns: ClassVar[tuple[DataColumn, ...]] = (DataColumn("x_um"),)
+    name, title, standard = "corner", "Corner", "our own"
+    description = "A dial gauge looks along x."
+    columns = (DataColumn("x_um"),)
     repeats: int = option(2, "Readings")
 
     def plan(self, scene):
@@ -135,9 +130,8 @@ class Corner(base.BenchTest):
         return Outcome((BenchQuantity("x_um", "reading", float(readings.mean()), "µm"),))
 
     def charts(self, runs):
-        curves = tuple(
-            Curve(run.label("x"), np.arange(len(run.readings)) * 1.0, run.readings) for run in runs
-        )
+        number = np.arange(self.repeats) * 1.0
+        curves = tuple(Curve(run.label("x"), number, run.readings) for run in runs)
         return (Lines("lines", "Readings", "number", "x [µm]", curves),)
 
 

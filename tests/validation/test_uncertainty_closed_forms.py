@@ -36,9 +36,15 @@ TWO = HEAD + "EXX = 3\nEYX = 4\n" + PAIR
 
 
 def trust(text, **options):
-    return Uncertainty(nodes=5, samples=100_000, **options).run(
-        parse_scene(text, "s"), lambda _: None
-    )
+    scene = parse_scene(text, "s")
+    return Uncertainty(nodes=5, samples=100_000, **options).run(scene, lambda _: None)
+
+
+def sure(text, error, **at):
+    """Uncertainty of a point with some error, at positions of axes."""
+    scene = parse_scene(text, "s")
+    axes = complete_coordinates(scene.machine, at, scene.workspace.positions)
+    return field_uncertainty(scene, np.array(error), axes, scene.view())
 
 
 @pytest.mark.parametrize("limit", [1.8, 2.0, 2.25])
@@ -147,10 +153,9 @@ def test_machines_drawn_move_together():
 def test_each_error_counts_by_its_own_degrees_of_freedom():
     # u 4 of infinite, 0.01 of three degrees of freedom; |E| is along x
     stated = "[uncertainty]\nEXX = 4\n[uncertainty.covariance]\nkeys = ['EYY']\n"
-    scene = parse_scene(f"{HEAD}EXX = 10\n{stated}matrix = [[0.0001]]\ndof = 3\n", "s")
-    doubt = scene_uncertainty(scene)
-    at = complete_coordinates(scene.machine, {"X": 100.0, "Y": 0.0}, scene.workspace.positions)
-    found = field_uncertainty(scene, np.array([10.0, 0.0, 0.0]), at, scene.view())
+    text = f"{HEAD}EXX = 10\n{stated}matrix = [[0.0001]]\ndof = 3\n"
+    found = sure(text, [10.0, 0.0, 0.0], X=100.0, Y=0.0)
+    doubt = found.errors
     assert found.u95_norm_um == pytest.approx(8.0)
     assert found.u95_um == pytest.approx([8.0, coverage_factor(3) * 0.01, 0.0])
     assert doubt.factor == 2.0
@@ -175,9 +180,7 @@ def test_where_there_is_no_error_its_uncertainty_is_all_there_is(errors):
 def test_the_probability_that_a_point_keeps_a_limit(limit, error):
     # u = 2 µm along x, y and z: |E|² / 4 is noncentral χ² of three degrees of freedom
     keys = "[uncertainty.covariance]\nkeys = ['EXX', 'EYX', 'EZX']\n"
-    scene = parse_scene(HEAD + "EXX = 3\n" + keys + "matrix = [[4], [0, 4], [0, 0, 4]]\n", "s")
-    at = complete_coordinates(scene.machine, {}, scene.workspace.positions)
-    found = field_uncertainty(scene, np.array(error), at, scene.view())
+    found = sure(HEAD + "EXX = 3\n" + keys + "matrix = [[4], [0, 4], [0, 0, 4]]\n", error)
     square = float(np.sum(np.square(error)))
     expected = ncx2.cdf(limit**2 / 4.0, 3, square / 4.0) if square else chi2.cdf(limit**2 / 4.0, 3)
     probability = float(found.conformance_probability(limit))
@@ -185,9 +188,7 @@ def test_the_probability_that_a_point_keeps_a_limit(limit, error):
 
 
 def test_a_sure_point_keeps_its_limit_or_not():
-    scene = parse_scene(HEAD + "EXX = 3\n[uncertainty]\nEC0Y = 1\n", "s")
-    at = complete_coordinates(scene.machine, {"Y": 0.0}, scene.workspace.positions)
-    found = field_uncertainty(scene, np.array([3.0, 0.0, 0.0]), at, scene.view())
+    found = sure(HEAD + "EXX = 3\n[uncertainty]\nEC0Y = 1\n", [3.0, 0.0, 0.0], Y=0.0)
     assert [float(found.conformance_probability(limit)) for limit in (2.9, 3.1)] == [0.0, 1.0]
 
 
