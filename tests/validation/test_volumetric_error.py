@@ -8,7 +8,6 @@ import pytest
 import warpspace
 from products import pairwise
 from warpspace.analysis.commands.contributions import expected_square
-from warpspace.analysis.commands.montecarlo import case_of
 from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.sampling.cases import Case, Reduction, SamplingPlan, reduce_nodes
 from warpspace.analysis.sampling.distribution import build_draws
@@ -52,7 +51,7 @@ def test_sampled_mean_square_is_the_trace(name, loop, distribution):
         samples=100_000,
         seed=5,
     )
-    variance, offset = expected_square(case_of(scene, result))
+    variance, offset = expected_square(result.case)
     assert result.rms_um == pytest.approx(math.sqrt(variance.sum() + offset), rel=0.005)
 
 
@@ -80,7 +79,7 @@ def test_max_over_the_corners_is_the_max_over_the_grid():
     machines = draws.draw(np.random.default_rng(0), 500)
     found = [
         reduce_nodes(machines, case.responses(find(7)), Reduction.MAX)
-        for find in (case.site.extreme, case.site.spread)
+        for find in (case.extreme, case.spread)
     ]
     np.testing.assert_allclose(found[0], found[1], rtol=1e-12)
 

@@ -462,7 +462,7 @@ def picture_concept(concept: Concept, nodes: int) -> ScenePicture:
     expected, zero = expected_um(concept, grid), np.zeros(grid.nominal_mm.shape)
     along_x = np.stack([expected, zero[..., 0], zero[..., 0]], axis=-1)
     return ScenePicture(
-        view=concept.sampled.view,
+        view=concept.sampled.case.view,
         grid=grid,
         field=ErrorField(grid.nominal_mm, along_x, zero),
         exaggeration=0.0,

@@ -7,14 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from warpspace.analysis import description
 from warpspace.analysis.blocks import Block, Column, Table
-from warpspace.analysis.description import (
-    Analysis,
-    ExpandedUncertainty,
-    ProgressCallback,
-    Result,
-    count_progress,
-)
 from warpspace.analysis.options import LOOP_HELP, option
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
 from warpspace.exceptions import OptionError
@@ -39,13 +33,13 @@ class FormDeviation:
     at: str  # where the other axes stand
     value: float
     unit: str
-    expanded_uncertainty: ExpandedUncertainty[float | None] = field(
-        default_factory=ExpandedUncertainty[float | None]
+    expanded_uncertainty: description.ExpandedUncertainty[float | None] = field(
+        default_factory=description.ExpandedUncertainty[float | None]
     )
 
 
 @dataclass(frozen=True, kw_only=True)
-class Form(Analysis):
+class Form(description.Analysis):
     """Evaluate flatness, straightness and squareness of SCENE.
 
     What an inspector would find on a part that the bent volume is copied to. Flatness and
@@ -60,7 +54,7 @@ class Form(Analysis):
     nodes: int = option(11, "Nodes per axis of the working volume", low=3, high=41, flag="--grid")
     loop: Loop = option(Loop.TOOL, LOOP_HELP)
 
-    def run(self, scene: Scene, watch: ProgressCallback, /) -> "FormResult":
+    def run(self, scene: Scene, watch: description.ProgressCallback, /) -> "FormResult":
         grid = build_grid(scene.model, scene.workspace, self.nodes)
         axes = grid.axes
         if sum(map(bool, axes)) < 2 or not all(is_linear(axis) for axis in axes if axis):
@@ -70,7 +64,7 @@ class Form(Analysis):
         deviations = tuple(_deviations(axes, grid.nominal_mm, error))
         uncertainty = field_uncertainty(scene, error, grid.coordinates, view, grid.point_mm)
         n_evaluations = 2 * (1 + len(uncertainty.errors.keys)) if uncertainty else 1
-        advance = count_progress(watch, n_evaluations)
+        advance = description.count_progress(watch, n_evaluations)
         advance(1)
         if uncertainty is None:
             return FormResult(deviations=deviations, title=scene.title)
@@ -83,7 +77,7 @@ class Form(Analysis):
 
         u95 = uncertainty.propagate(deviation_values)
         deviations = tuple(
-            replace(deviation, expanded_uncertainty=ExpandedUncertainty(u95=expanded))
+            replace(deviation, expanded_uncertainty=description.ExpandedUncertainty(u95=expanded))
             for deviation, expanded in zip(deviations, u95, strict=True)
         )
         return FormResult(deviations=deviations, title=scene.title, uncertainty=uncertainty.errors)
@@ -99,7 +93,7 @@ def _deviations(axes: tuple[str, ...], nominal: Array, error: Array) -> Iterator
 
 
 @dataclass(frozen=True, kw_only=True)
-class FormResult(Result):
+class FormResult(description.Result):
     """Form deviations of the distorted volume."""
 
     json_keys = ("deviations",)

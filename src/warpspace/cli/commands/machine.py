@@ -28,8 +28,8 @@ from warpspace.cli.tables import print_table, print_text, progress
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
-    from warpspace.analysis.publications import PrintedNumber
-    from warpspace.analysis.tolerance_check import Check, Measured
+    from warpspace.analysis.registry import PrintedNumber
+    from warpspace.analysis.statistics import Check, Measured
     from warpspace.scene.model import Scene
 
 NOTES = "warpspace.cli.note_editing"
@@ -135,7 +135,7 @@ def check(
     fit to the predicted map.
     """
     from warpspace.analysis.description import to_json
-    from warpspace.analysis.tolerance_check import measured
+    from warpspace.analysis.statistics import measured
     from warpspace.scene.library import load_scene
 
     loaded = [load_scene(name) for name in scenes]
@@ -258,7 +258,7 @@ def merge() -> None:
 
 
 def _measured_errors(scene: "Scene") -> list["PrintedNumber"]:
-    from warpspace.analysis.publications import PUBLICATIONS
+    from warpspace.analysis.registry import PUBLICATIONS
 
     printed = (publication.measured_error(scene) for publication in PUBLICATIONS.members())
     return [number for number in printed if number is not None]
@@ -306,7 +306,7 @@ def thesis(markdown: str | None, *, force: bool, as_json: bool) -> None:
     A number agrees where it lies within half of the last printed digit. Rows that do not agree say
     why. Nothing is tuned to agree.
     """
-    from warpspace.thesis_example.presentation import markdown_page, thesis_blocks, thesis_json
+    from warpspace.thesis_example.rows import markdown_page, thesis_blocks, thesis_json
     from warpspace.thesis_example.rows import thesis as compare
 
     with progress("computing", silent=as_json):

@@ -45,10 +45,10 @@ def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
     scene = scenes[0]
     sampled = montecarlo(MonteCarlo(loop=Loop(settings.loop)).case(scene, SamplingPlan()))
     title = f"Machines within tolerance: {scene.title}"
-    loop = " · ".join((_loop(scene, settings), *placed_words(sampled.view)))
+    loop = " · ".join((_loop(scene, settings), *placed_words(sampled.case.view)))
     subtitle = (
-        f"{loop} · {spell_count(sampled.plan.samples)} machines, one random point each ·"
-        f" {sampled.draws.distribution} over the tolerances · seed {sampled.plan.seed}"
+        f"{loop} · {spell_count(sampled.case.plan.samples)} machines, one random point each ·"
+        f" {sampled.case.draws.distribution} over the tolerances · seed {sampled.case.plan.seed}"
     )
     histogram = sampled_histogram(sampled, title, subtitle)
     return _draw("montecarlo", title, scene, settings, histogram_chart, histogram)

@@ -166,7 +166,7 @@ def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: b
         *([] if plan.own_tolerances else [tolerance_words(first.scene.tolerances)]),
         f"{spell_count(plan.samples)} sampled machines each, {plan.drawn}",
         "largest |E| of each" if plan.over == "max" else "|E| at a random point of each",
-        LOOP_WORDS[first.sampled.view.loop],
+        LOOP_WORDS[first.sampled.case.view.loop],
         view_words(settings.view, (2, 2, 2)),
     ]
     legend = [
