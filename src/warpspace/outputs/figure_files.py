@@ -16,27 +16,21 @@ from PIL.PngImagePlugin import PngInfo
 from warpspace.outputs.drawing.settings import FIGURE_ENDINGS, SAVE_RC, FigureSettings
 from warpspace.outputs.drawing.sheet import Drawing
 from warpspace.outputs.figures.registry import draw_figure
-from warpspace.outputs.file_output import check_target, write_atomically
+from warpspace.outputs.file_output import check_target, write_content
 from warpspace.scene.model import Scene
 
 
 def figure_bytes(drawing: Drawing, form: str) -> bytes:
     facts = drawing.facts
     about = f"{facts['settings']}; scene={facts['scene']}"
-    tags = {"Title": drawing.title}
-    if form == "png":
-        tags |= {
-            "Software": facts["version"],
-            "Description": about,
-            "Exaggeration": facts["exaggeration"],
-            "Scene": facts["scene"],
-        }
-    elif form == "svg":
-        tags |= {"Creator": facts["version"], "Description": about}
-    else:
-        keywords = f"scene={facts['scene']}, exaggeration={facts['exaggeration']}"
-        tags |= {"Creator": facts["version"], "Subject": about, "Keywords": keywords}
-    return encode_figure(drawing.figure, form, tags)
+    numbers = {name.title(): facts[name] for name in ("exaggeration", "scene")}
+    keywords = f"scene={facts['scene']}, exaggeration={facts['exaggeration']}"
+    tags = {
+        "png": {"Software": facts["version"], "Description": about, **numbers},
+        "svg": {"Creator": facts["version"], "Description": about},
+        "pdf": {"Creator": facts["version"], "Subject": about, "Keywords": keywords},
+    }[form]
+    return encode_figure(drawing.figure, form, {"Title": drawing.title, **tags})
 
 
 def render_figure(
@@ -58,8 +52,7 @@ def write_figure(
 ) -> Path:
     form = check_target(path, FIGURE_ENDINGS, overwrite=force).suffix.lower().lstrip(".")
     content = render_figure(name, scenes, settings or FigureSettings(), form)
-    with write_atomically(path, overwrite=force) as temporary:
-        temporary.write_bytes(content)
+    write_content(content, path, overwrite=force)
     return Path(path)
 
 
@@ -67,8 +60,7 @@ def write_chart(figure: Figure, path: str | Path, *, overwrite: bool = True) -> 
     """Write a chart; the ending chooses the format, the same chart gives the same bytes."""
     target = check_target(path, FIGURE_ENDINGS, overwrite=overwrite)
     content = encode_figure(figure, target.suffix.lower().lstrip("."))
-    with write_atomically(target, overwrite=overwrite) as temporary:
-        temporary.write_bytes(content)
+    write_content(content, target, overwrite=overwrite)
     return target
 
 

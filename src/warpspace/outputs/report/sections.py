@@ -23,7 +23,7 @@ from warpspace.machine.axes import parameter
 from warpspace.machine.limits import MAX_CSV_BYTES, MOST_CONCEPTS
 from warpspace.outputs.drawing.settings import PRINTED_PX, FigureSettings
 from warpspace.outputs.figures.registry import figure_kinds
-from warpspace.outputs.file_output import check_target, write_atomically
+from warpspace.outputs.file_output import check_target, write_content
 from warpspace.outputs.processes import FigureWorker
 from warpspace.outputs.report.review import (
     ReportSettings,
@@ -187,8 +187,7 @@ def write_report(
     form, embed = ("svg", embed) if page else ("pdf", None)
     report = build_report(scenes, settings, form=form, embed=embed, **parts)
     content = render_html(report).encode() if page else render_pdf(report)
-    with write_atomically(target, overwrite=overwrite) as temporary:
-        temporary.write_bytes(content)
+    write_content(content, target, overwrite=overwrite)
     return report
 
 
