@@ -10,7 +10,6 @@ from warpspace.outputs.drawing.canvas import (
     LEADER_FROM,
     Canvas,
     Occupancy,
-    draw_leader,
     write_label,
 )
 from warpspace.outputs.drawing.settings import DARK, LIGHT, FigureSettings, factor
@@ -52,7 +51,7 @@ def draw_view(
     for text, point_px in labels:
         placed = write_label(canvas, text, [point_px], drawn, occupancy)
         if placed is not None and placed.distance > canvas.px(LEADER_FROM):
-            draw_leader(canvas, placed, canvas.theme.ink)
+            placed.draw_leader(canvas, canvas.theme.ink)
     program, description = f"warpspace {__version__}", "; ".join(facts)
     tags = {"Title": title, "Software": program, "Description": description}
     return encode_figure(canvas.figure, "png", tags)

@@ -145,7 +145,7 @@ def _write_npz(record: FieldRecord, path: Path) -> None:
 
 
 def _write_vts(record: FieldRecord, path: Path) -> None:
-    arrays = field_arrays(record.field) | record.u95
+    arrays = {**field_arrays(record.field), **record.u95}
     writer = _vts_writer(structured_grid(record.field.nominal_mm, arrays), ABOUT, record.about)
     writer.SetDataModeToAppended()
     writer.EncodeAppendedDataOff()

@@ -31,14 +31,18 @@ from warpspace.outputs.figures.machine_figures import draw_bodies
 from warpspace.outputs.figures.maps import ISOLINE_STEP, isoline_words
 from warpspace.picture.comparison import (
     CHANGE,
-    DIFFERENCE_LENGTH,
     STATISTICS,
     scene_change,
     share_exaggeration,
     statistics_change,
 )
 from warpspace.picture.formatting import LOOP_WORDS, tolerance_words
-from warpspace.picture.model import ScenePicture, picture_concept, view_words
+from warpspace.picture.model import (
+    DIFFERENCE_LENGTH,
+    ScenePicture,
+    picture_concept,
+    view_words,
+)
 from warpspace.scene.model import Scene
 from warpspace.units import Array, spell, spell_count, spell_short, spell_signed
 
