@@ -337,14 +337,12 @@ def evaluate_field(
     point = chain.nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
     shape = (*np.broadcast_shapes(batch_shape(coordinates), point.shape[:-1]), 3)
     error, orientation = np.empty(shape), np.empty(shape)
-    reference = reference_point(model, view, coordinates)
-    if reference is None:
-        fixed = np.zeros(3)
-    else:
-        reference_at, reference_mm = reference
+    reference, fixed = reference_point(model, view, coordinates), np.zeros(3)
+    if reference is not None:
         unreferenced = replace(view, frame="machine", reference=None)
+        at, point_of_reference = reference
         fixed = evaluate_field(
-            model, errors, reference_at, unreferenced, reference_mm, exact=exact
+            model, errors, at, unreferenced, point_of_reference, exact=exact
         ).error_um
     placement = find_placement(model, errors, view, exact=exact)
 

@@ -1,4 +1,4 @@
-"""Figures and charts to bytes and files; the same figure gives the same bytes."""
+"""Figures, charts and drawings of a page as bytes and files, the same for the same content."""
 
 import gc
 import io
@@ -10,14 +10,26 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from warpspace.outputs.drawing.settings import FIGURE_ENDINGS, SAVE_RC, FigureSettings
-from warpspace.outputs.drawing.sheet import Drawing
+from warpspace.geometry.colour import ColourScale
+from warpspace.outputs.drawing.canvas import LEADER_FROM, Canvas, Occupancy, write_label
+from warpspace.outputs.drawing.settings import (
+    DARK,
+    FIGURE_ENDINGS,
+    LIGHT,
+    SAVE_RC,
+    FigureSettings,
+    factor,
+)
+from warpspace.outputs.drawing.sheet import Drawing, Row, Sheet, draw_heading
 from warpspace.outputs.figures.registry import draw_figure
 from warpspace.outputs.file_output import check_target, write_content
+from warpspace.resources import __version__
 from warpspace.scene.model import Scene
+from warpspace.units import Array
 
 
 def figure_bytes(drawing: Drawing, form: str) -> bytes:
@@ -91,3 +103,42 @@ def encode_figure(figure: Figure, form: str, facts: Mapping[str, str] | None = N
                 facecolor=figure.get_facecolor(),
             )  # fmt: skip
     return buffer.getvalue()
+
+
+HEAD, PANEL = 190.0, 330.0  # space above and beside the pixels, px of a 1600 × 1200 figure
+
+
+def draw_view(
+    pixels: NDArray[np.uint8],  # [height, width, 3 or 4]
+    title: str,
+    facts: Sequence[str],
+    scale: ColourScale,
+    marks: Mapping[str, float],
+    rows: Sequence[Row],
+    bars: tuple[float, float] | None,  # px of a millimetre, display factor; None for no scale bars
+    labels: Sequence[tuple[str, Array]],  # text and point, [2], px from the left bottom
+    dark: bool,
+) -> bytes:
+    """Draw the pixels of a page as a PNG with heading, colour bar, scale bars and labels."""
+    height, width = pixels.shape[:2]
+    unit = factor(width, height)
+    canvas = Canvas(
+        width + round(PANEL * unit), height + round(HEAD * unit), DARK if dark else LIGHT
+    )
+    drawn = (0.0, 0.0, float(width), float(height))
+    canvas.image(pixels, drawn)
+    draw_heading(canvas, title, facts)
+    column = (width + 0.3 * canvas.margin, 0.6 * canvas.margin, canvas.width - 0.6 * canvas.margin,
+              float(height))  # fmt: skip
+    sheet = Sheet("view", canvas, title, drawn, column, (), FigureSettings(dark=dark))
+    sheet.draw_panel(scale, f"{scale.label} [{scale.unit}]", list(marks.items()), rows, bars)
+    occupancy = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
+    if pixels.shape[2] == 4:
+        occupancy.add_mask(pixels[..., 3] > 127, drawn)
+    for text, point_px in labels:
+        placed = write_label(canvas, text, [point_px], drawn, occupancy)
+        if placed is not None and placed.distance > canvas.px(LEADER_FROM):
+            placed.draw_leader(canvas, canvas.theme.ink)
+    program, description = f"warpspace {__version__}", "; ".join(facts)
+    tags = {"Title": title, "Software": program, "Description": description}
+    return encode_figure(canvas.figure, "png", tags)

@@ -43,10 +43,8 @@ class ProcessPool(Executor):
     ) -> None:
         if _ending.is_set():
             raise exceptions.RenderError("the program is ending: no process is started")
-        self.ended = False
-        self._tasks_per_process = tasks_per_process
-        self._may_lose = losses
-        self._lost = 0
+        self._tasks_per_process, self._may_lose = tasks_per_process, losses
+        self.ended, self._lost = False, 0
         self._lock = threading.Lock()
         self._workers: set[_Worker] = set()
         self._idle: list[_Worker] = []
@@ -306,11 +304,9 @@ class FigureWorker:
     def close(self, *, wait: bool = True) -> None:
         with self._lock:
             pool, self._pool = self._pool, None
-        if pool is None:
-            return
-        if wait:
+        if pool is not None and wait:
             pool.shutdown(cancel_futures=True)
-        else:
+        elif pool is not None:
             pool.kill()
 
     def __enter__(self) -> "FigureWorker":
