@@ -349,7 +349,7 @@ def _polar(axes: Axes, chart: Lines) -> None:
     faint: dict[str, Any] = {"color": ground().faint, "linewidth": 0.8}
     middle: dict[str, Any] = {"color": ground().muted, "ha": "center", "va": "center"}
     for value, radius in layout.rings:
-        look = faint if value != 0.0 else {"color": ground().ink, "linewidth": 1.0}
+        look = faint if value != 0.0 else {**faint, "color": ground().ink, "linewidth": 1.0}
         axes.plot(radius * np.cos(turn), radius * np.sin(turn), **look)
         if value != 0.0:
             axes.text(0.0, radius, f"{value:+g}", size=SMALL - 1.5, bbox=_paper(0.4), **middle)
@@ -407,7 +407,7 @@ def histogram_chart(histogram: Histogram) -> Figure:
         }  # fmt: skip
         marks = [*histogram.marks, *([] if limit is None else [("limit", limit)])]
         _mark(axes, [(name, at, *styles.get(name, (ground().ink, "-"))) for name, at in marks])
-        captions = (
+        captions: tuple[tuple[float, dict[str, Any]], ...] = (
             (0.95, {"size": TEXT + 2.0, "weight": "bold", "color": ground().ink}),
             (0.83, {"size": SMALL, "weight": "normal", "color": ground().muted}),
         )
