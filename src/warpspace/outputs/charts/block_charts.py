@@ -347,9 +347,10 @@ def _polar(axes: Axes, chart: Lines) -> None:
     axes.set(aspect="equal", xlim=(-1.18, 1.18), ylim=(-1.18, 1.18))
     turn = np.linspace(0.0, 2.0 * np.pi, 361)
     faint: dict[str, Any] = {"color": ground().faint, "linewidth": 0.8}
+    bold: dict[str, Any] = {"color": ground().ink, "linewidth": 1.0}
     middle: dict[str, Any] = {"color": ground().muted, "ha": "center", "va": "center"}
     for value, radius in layout.rings:
-        look = faint if value != 0.0 else {**faint, "color": ground().ink, "linewidth": 1.0}
+        look = faint if value != 0.0 else bold
         axes.plot(radius * np.cos(turn), radius * np.sin(turn), **look)
         if value != 0.0:
             axes.text(0.0, radius, f"{value:+g}", size=SMALL - 1.5, bbox=_paper(0.4), **middle)
