@@ -120,7 +120,7 @@ def draw_view(
     cancelled: threading.Event,
 ) -> bytes:
     """Draw the view of a page as a PNG with title, scale and statistics."""
-    from warpspace.outputs.view import draw_view as draw
+    from warpspace.outputs.figure_files import draw_view as draw
 
     statistics = picture.statistics
     numbers = {"mean": statistics.mean_um, "P95": statistics.p95_um, "max": statistics.max_um}
