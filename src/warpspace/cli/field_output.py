@@ -8,12 +8,7 @@ import numpy as np
 from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.analysis.description import to_json
 from warpspace.analysis.statistics import statistics, volume_statistics
-from warpspace.analysis.uncertainty.propagation import (
-    field_uncertainty,
-    u95_columns,
-    u95_lines,
-    volume_uncertainty,
-)
+from warpspace.analysis.uncertainty import propagation
 from warpspace.cli import shared_options
 from warpspace.cli.analyses import print_blocks
 from warpspace.cli.tables import print_text, progress
@@ -22,13 +17,7 @@ from warpspace.field.evaluate import ErrorField, View, placed_words
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
 from warpspace.kinematics.model import complete_coordinates
 from warpspace.picture.formatting import direction_words, point_axes, spell_at, spell_point
-from warpspace.scene.model import (
-    Scene,
-    choose_view,
-    evaluate,
-    evaluate_grid,
-    second_order,
-)
+from warpspace.scene import model
 from warpspace.units import Array
 
 MAX_LISTED = 20
@@ -60,24 +49,24 @@ def print_field(
         )
     files = [path for path in (csv_path, output) if path is not None]
     loaded = shared_options.load_placed(scene, direction, loop, placed=placed)
-    view = choose_view(loaded, loop, frame)
+    view = model.choose_view(loaded, loop, frame)
     with progress("evaluating", silent=as_json):
         axes, result, nodes = _evaluate(loaded, points, grid, view, exact=exact)
         places = axes if nodes is None else None
         estimate: dict[str, float] = {}
         if not exact:
-            estimate = shared_options.warn_second_order(second_order(loaded, loop, at=places))
+            estimate = shared_options.warn_second_order(model.second_order(loaded, loop, at=places))
         node_statistics = statistics(result, axes)
         u95 = {}
         if nodes is None:
-            uncertainty = field_uncertainty(loaded, result.error_um, axes, view)
+            uncertainty = propagation.field_uncertainty(loaded, result.error_um, axes, view)
             summary = node_statistics
             u95 = uncertainty.columns if uncertainty and uncertainty.errors.is_known else {}
         else:
-            uncertainty = volume_uncertainty(loaded, view, max(nodes.shape))
+            uncertainty = propagation.volume_uncertainty(loaded, view, max(nodes.shape))
             summary = volume_statistics(result, nodes)
             if files or as_json:
-                u95 = u95_columns(loaded, result, axes, view, nodes.point_mm)
+                u95 = propagation.u95_columns(loaded, result, axes, view, nodes.point_mm)
         summary = uncertainty.with_expanded_uncertainty(summary) if uncertainty else summary
     if files:
         from warpspace.outputs.exports.fields import FieldRecord, write_field
@@ -124,7 +113,7 @@ def print_field(
         f"  {result.norm_um.size} points{volume}: mean {summary.mean_um:.2f},"
         f" RMS {summary.rms_um:.2f}, P95 {summary.p95_um:.2f}, max {summary.max_um:.2f} µm"
     )
-    for line in u95_lines(uncertainty and uncertainty.errors, {"": summary}):
+    for line in propagation.u95_lines(uncertainty and uncertainty.errors, {"": summary}):
         print_text(line)
     if nodes is not None:
         print_text(f"  each node counted once: mean {node_statistics.mean_um:.2f} µm")
@@ -136,7 +125,7 @@ def print_field(
 
 
 def _evaluate(
-    scene: Scene, points: tuple[str, ...], grid: int | None, view: View, *, exact: bool
+    scene: model.Scene, points: tuple[str, ...], grid: int | None, view: View, *, exact: bool
 ) -> tuple[Mapping[str, Array], ErrorField, Grid | None]:
 
     if points:
@@ -145,7 +134,7 @@ def _evaluate(
             complete_coordinates(scene.machine, point, scene.workspace.positions) for point in typed
         ]
         axes = {name: np.array([point[name] for point in full]) for name in scene.machine.axes}
-        error_field = evaluate(scene, at=axes, loop=view.loop, exact=exact, frame=view.frame)
+        error_field = model.evaluate(scene, at=axes, loop=view.loop, exact=exact, frame=view.frame)
         for point in typed:
             shared_options.warn_outside_travel(scene.machine, point)
         return axes, error_field, None
@@ -153,7 +142,7 @@ def _evaluate(
     sampled_grid = build_grid(scene.model, scene.workspace, nodes)
     return (
         sampled_grid.coordinates,
-        evaluate_grid(scene, sampled_grid, view, exact=exact),
+        model.evaluate_grid(scene, sampled_grid, view, exact=exact),
         sampled_grid,
     )
 
