@@ -22,7 +22,6 @@ from warpspace.units import Array
 
 MAX_LISTED = 20
 POINTS_AT_ONCE = 5000  # points that are converted to JSON at a time
-FIELDS = (".parquet", ".npz", ".csv", ".vts")
 
 
 def print_field(
@@ -43,7 +42,7 @@ def print_field(
     if points and grid is not None:
         raise OptionError("--at and --grid exclude each other; use one of them")
     if points and output is not None and output.lower().endswith(".vts"):
-        endings = ", ".join(ending for ending in FIELDS if ending != ".vts")
+        endings = ", ".join(ending for ending in shared_options.FIELDS if ending != ".vts")
         raise OptionError(
             f"{output}: a .vts file holds a grid, --at defines points; expected {endings}"
         )

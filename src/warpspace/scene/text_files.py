@@ -192,12 +192,9 @@ def _shorten(text: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    shortened = text[: MAX_VALUE_LENGTH + 1]
-    return (
-        '"'
-        + "".join(_ESCAPES.get(c, c if c.isprintable() else f"\\u{ord(c):04x}") for c in shortened)
-        + '"'
-    )
+    letters = text[: MAX_VALUE_LENGTH + 1]
+    spelling = [_ESCAPES.get(c, c if c.isprintable() else f"\\u{ord(c):04x}") for c in letters]
+    return f'"{"".join(spelling)}"'
 
 
 def _spell(value: object, depth: int) -> str:

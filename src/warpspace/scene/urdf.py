@@ -17,7 +17,7 @@ from warpspace.kinematics.transforms import inverse, roll_pitch_yaw_deg
 from warpspace.machine import definition, limits
 from warpspace.machine.axes import MAX_AXES, direction_index, is_axis_name, is_linear
 from warpspace.machine.errors import ToleranceSet
-from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, spanning_axes
 from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.scene.starter import error_lines
 from warpspace.scene.text_files import one_line, read_text
@@ -440,16 +440,13 @@ def _plain(text: str) -> str:
 
 
 def _ranges(machine: definition.Machine) -> dict[str, definition.Range]:
-    spanned: set[int] = set()
+    spanning = spanning_axes(machine.axes)
     ranges: dict[str, definition.Range] = {}
     for name, axis in machine.axes.items():
         low, high = axis.travel
         at = min(max(0.0, low), high)
-        ranges[name] = (at, at)
-        if is_linear(name) and direction_index(name) not in spanned:
-            spanned.add(direction_index(name))
-            ranges[name] = axis.travel
-    free = 3 - len(spanned)
+        ranges[name] = axis.travel if name in spanning else (at, at)
+    free = 3 - len(spanning)
     turning = [name for name in machine.chain.tool if not is_linear(name)]
     if free > 1:
         for name in turning[:free]:

@@ -204,17 +204,11 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
     metavar="X=..,Y=..",
     help="Position of the new note: axis positions in mm and degrees.  [none]",
 )
-@click.option(
-    "--kind",
-    type=click.Choice(("note", "question", "decision")),
-    default="note",
-    show_default=True,
-    help="Kind of the new note.",
+@shared_options.choice_option(
+    "--kind", ("note", "question", "decision"), "Kind of the new note.", "note"
 )
 @click.option("--author", default="", help="Author of the new note.")
-@click.option(
-    "--step", type=int, default=0, help="Position in the story; 0 for none.", show_default=True
-)
+@click.option("--step", default=0, help="Position in the story; 0 for none.", show_default=True)
 @shared_options.output_option(
     "File to write: the notes as .csv or .md, or with --add the scene as .toml.  [SCENE]",
     ".csv", ".md", ".toml", required=False,

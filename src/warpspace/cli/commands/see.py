@@ -12,6 +12,7 @@ from warpspace.cli.analyses import print_blocks
 from warpspace.cli.file_arguments import SceneName
 from warpspace.cli.shared_options import (
     FIGURES,
+    choice_option,
     component_option,
     deferred,
     direction_option,
@@ -141,10 +142,10 @@ def view(
     metavar="NAME",
     help=f"Figure to draw: {', '.join(figure_names())}.  [error-map]",
 )
-@click.option(
+@choice_option(
     "--motion",
-    type=click.Choice(("exaggeration", "rotation")),
-    help="Motion: from true scale to the display factor and back, or one turn of the rotary"
+    ("exaggeration", "rotation"),
+    "Motion: from true scale to the display factor and back, or one turn of the rotary"
     " table.  [exaggeration]",
 )
 @click.option("--frames", type=int, help=f"Frames of one cycle.  [{FRAMES}]")
@@ -353,21 +354,18 @@ def export(
 )
 @click.option(
     "--samples",
-    type=int,
     default=100_000,
     show_default=True,
     help="Number of machines sampled within the tolerances.",
 )
-@click.option(
+@choice_option(
     "--distribution",
-    type=click.Choice(("uniform", "normal")),
-    default="uniform",
-    show_default=True,
-    help="Distribution: uniform over the tolerance, or normal with 3σ = half-width.",
+    ("uniform", "normal"),
+    "Distribution: uniform over the tolerance, or normal with 3σ = half-width.",
+    "uniform",
 )
 @click.option(
     "--seed",
-    type=int,
     default=0,
     show_default=True,
     help="Seed of the random numbers; equal seeds give equal results.",
