@@ -78,27 +78,23 @@ def print_field(
     if as_json:
         document: dict[str, object] = {"loop": loop, "frame": frame}
         document["statistics"] = to_json(summary)
-        document |= {} if view.placed_over is None else {"placement": "fitted out"}
+        if view.placed_over is not None:
+            document["placement"] = "fitted out"
         document |= estimate
-        document |= {} if view.reference is None else {"reference": dict(view.reference)}
+        if view.reference is not None:
+            document["reference"] = dict(view.reference)
         if nodes is not None:
             document["statistics_nodes"] = to_json(node_statistics)
         if output is not None:
             size = {"output": output, "points_written": result.norm_um.size}
             click.echo(shared_options.spell_json({**size, **document}))
             return
-        document |= (
-            {"unknown": uncertainty.errors.unknown}
-            if uncertainty and uncertainty.errors.unknown
-            else {}
-        )
+        if uncertainty and uncertainty.errors.unknown:
+            document["unknown"] = uncertainty.errors.unknown
         if nodes is None and uncertainty and u95:
             u95["covariance_um2"] = uncertainty.covariance_um2
-            u95 |= (
-                {}
-                if loaded.limit_um is None
-                else {"probability": uncertainty.conformance_probability(loaded.limit_um)}
-            )
+            if loaded.limit_um is not None:
+                u95["probability"] = uncertainty.conformance_probability(loaded.limit_um)
         _print_json(axes, result, document, u95)
         return
     conditions = (*direction_words(loaded), *placed_words(view))
@@ -126,7 +122,6 @@ def print_field(
 def _evaluate(
     scene: model.Scene, points: tuple[str, ...], grid: int | None, view: View, *, exact: bool
 ) -> tuple[Mapping[str, Array], ErrorField, Grid | None]:
-
     if points:
         typed = [shared_options.parse_point(text, scene.machine.axes) for text in points]
         full = [
@@ -137,13 +132,8 @@ def _evaluate(
         for point in typed:
             shared_options.warn_outside_travel(scene.machine, point)
         return axes, error_field, None
-    nodes = DEFAULT_NODES if grid is None else grid
-    sampled_grid = build_grid(scene.model, scene.workspace, nodes)
-    return (
-        sampled_grid.coordinates,
-        model.evaluate_grid(scene, sampled_grid, view, exact=exact),
-        sampled_grid,
-    )
+    nodes = build_grid(scene.model, scene.workspace, DEFAULT_NODES if grid is None else grid)
+    return nodes.coordinates, model.evaluate_grid(scene, nodes, view, exact=exact), nodes
 
 
 def _print_json(
@@ -175,13 +165,8 @@ def _print_json(
             for place, row in zip(places, numbers, strict=True)
         ]
         click.echo((", " if start else "") + shared_options.spell_json(rows)[1:-1], nl=False)
-    click.echo(
-        "]"
-        + "".join(
-            f', "{name}": {shared_options.spell_json(part)}' for name, part in document.items()
-        )
-        + "}"
-    )
+    entries = [f', "{name}": {shared_options.spell_json(part)}' for name, part in document.items()]
+    click.echo(f"]{''.join(entries)}}}")
 
 
 def _list_points(

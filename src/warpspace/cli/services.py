@@ -156,7 +156,6 @@ def _run_worker(
 
 @contextmanager
 def _renderer_slot(cancelled: threading.Event) -> Generator[None]:
-
     while not _renderers.acquire(timeout=POLL_S):
         if cancelled.is_set():
             raise CancelledError("cancelled while waiting for a renderer")
@@ -250,7 +249,6 @@ def _check_size(picture: "ScenePicture") -> None:
 def embed_view(
     scene: "Scene", *, exaggeration: float, nodes: int, loop: str, largest: float
 ) -> str:
-
     live = offline_page.offline_picture(
         scene, exaggeration=exaggeration, nodes=nodes, loop=Loop(loop), largest=largest
     )

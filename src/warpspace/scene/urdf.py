@@ -101,10 +101,9 @@ def not_installed() -> OptionError:
 
 def _problems(robot: Any) -> Iterable[str]:
     links = [link.name for link in robot.links]
-    for name in _twice(links):
-        yield f"link {name!r} occurs twice; expected each name once"
-    for name in _twice([joint.name for joint in robot.joints]):
-        yield f"joint {name!r} occurs twice; expected each name once"
+    for what, names in (("link", links), ("joint", [joint.name for joint in robot.joints])):
+        for name in sorted(str(name) for name, count in Counter(names).items() if count > 1):
+            yield f"{what} {name!r} occurs twice; expected each name once"
     if not links:
         yield "has no link"
         return
@@ -129,10 +128,6 @@ def _problems(robot: Any) -> Iterable[str]:
     elif len(roots) > 1:
         listed = ", ".join(map(repr, roots[:6]))
         yield f"links {listed} hang on nothing; expected one such link, the frame of the machine"
-
-
-def _twice(names: list[str]) -> list[str]:
-    return sorted(str(name) for name, count in Counter(names).items() if count > 1)
 
 
 def root_of(robot: Any) -> str:

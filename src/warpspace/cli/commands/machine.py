@@ -33,11 +33,8 @@ def list_(kind: Kind | None, *, as_json: bool) -> None:
 
     A scene refers to a machine by name, machine = "scara"; the scene machine_NAME shows it.
     """
-    listing = {
-        kind_name: _list_kind(kind_name)
-        for kind_name in ("scenes", "machines")
-        if kind in (None, kind_name)
-    }
+    kinds: tuple[Kind, ...] = ("scenes", "machines") if kind is None else (kind,)
+    listing = {kind_name: _list_kind(kind_name) for kind_name in kinds}
     if as_json:
         shared_options.print_json(listing)
         return
@@ -54,16 +51,15 @@ def _list_kind(kind: Kind) -> list[dict[str, str | None]]:
 
     if kind == "scenes":
         return [{"name": name, "title": load_scene(name).title} for name in scene_names()]
-    pictures = {name: machine_picture(name) for name in machine_names()}
     return [
         {
             "name": machine.name,
             "title": machine.title,
             "chain": str(machine.chain),
             "source": machine.source,
-            "picture": str(picture) if picture else None,
+            "picture": str(machine_picture(machine.name) or "") or None,
         }
-        for machine, picture in ((load_machine(name), at) for name, at in pictures.items())
+        for machine in map(load_machine, machine_names())
     ]
 
 
