@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,13 +93,14 @@ def _on_surfaces(
         points, triangles, node_of = solid_map(mapped)
         hit = pick_surface(origin, unit, points, triangles)
         if hit is not None:
-            nodes, grid = node_of[hit.vertices], mapped.grid
+            vertices, weights, distance = hit
+            nodes, grid = node_of[vertices], mapped.grid
             at = {
-                name: float(np.broadcast_to(values, grid.shape).reshape(-1)[nodes] @ hit.weights)
+                name: float(np.broadcast_to(values, grid.shape).reshape(-1)[nodes] @ weights)
                 for name, values in grid.coordinates.items()
                 if is_linear(name) or name in grid.axes
             }
-            yield Picked(at), hit.distance
+            yield Picked(at), distance
 
 
 def _on_traces(picture: LivePicture, origin: Array, unit: Array) -> Iterator[tuple[Picked, float]]:
@@ -246,21 +246,14 @@ def _measure_distance(of: Identity) -> tuple[DistanceResult, Array, Array] | Non
 # --- Rays from the camera -------------------------------------------------------------------------
 
 
-class Hit(NamedTuple):
-    """Intersection of a ray with a surface."""
-
-    vertices: NDArray[np.intp]  # [3]; vertex numbers of the triangle
-    # [3]; barycentric weights of the point in it, for values per vertex
-    weights: Array
-    distance: float  # along the ray, in lengths of its direction
-
-
 def pick_surface(
     origin: Array, direction: Array, vertices: Array, triangles: NDArray[np.intp]
-) -> Hit | None:
-    """Find the first of the triangles, [T, 3], on a ray.
+) -> tuple[NDArray[np.intp], Array, float] | None:
+    """Find the first of the triangles, [T, 3], on a ray; None where the ray misses.
 
-    Origin and direction, [3], are in the units of the vertices, [M, 3]; None where the ray misses.
+    Origin and direction, [3], are in the units of the vertices, [M, 3]. Return the vertex numbers
+    of the triangle, [3], the barycentric weights of the point in it, [3], and its distance along
+    the ray, in lengths of the direction.
     """
     a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
     edges = np.stack([b - a, c - a, np.broadcast_to(-direction, a.shape)], axis=-1)
@@ -270,7 +263,7 @@ def pick_surface(
     if not inside.any():
         return None
     at = int(np.argmin(np.where(inside, distance, np.inf)))
-    return Hit(triangles[at], np.array([1.0 - u[at] - v[at], u[at], v[at]]), float(distance[at]))
+    return triangles[at], np.array([1.0 - u[at] - v[at], u[at], v[at]]), float(distance[at])
 
 
 def pick_point(

@@ -41,15 +41,11 @@ from warpspace.scene.model import Scene
 RETENTION_S = 600.0
 MAX_CLOSED_TABS = 64
 MAX_HISTORY_BYTES = 256 * 2**20  # held by the histories of all of them
-_TOKEN = re.compile(r"[0-9a-f]{32}")
+TAB_TOKEN = re.compile(r"[0-9a-f]{32}")
 
 
 def new_token() -> str:
     return secrets.token_hex(16)
-
-
-def is_token(text: str) -> bool:
-    return _TOKEN.fullmatch(text) is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,19 +141,15 @@ def read_page_copy(
     return state, camera, (*missing, START_VALUES)
 
 
-RESTORED_TITLE = "This tab is restored"
 RESTORED = (
     "The server was restarted, or the tab was disconnected for more than ten minutes. Scene,"
     " errors, view, camera, picked point and comparison are restored unless named below. Undo"
     " returns to the scene that the server was started with."
 )
-MISSING = "Not restored: {}."
-REFUSED_TITLE = "This tab could not be restored"
 REFUSED = (
     "The server was restarted, or the tab was disconnected for more than ten minutes. The tab"
     " starts afresh, since its copy cannot be used here: {}"
 )
-JOINED_TITLE = "You are in the shared review as it is now"
 JOINED = (
     "The server was restarted, and the review has been changed since. The copy in this tab was not"
     " restored."
@@ -208,12 +200,12 @@ class TabKeeper(Panel):
     def _restore(self, text: str) -> None:
         context, say = self.context, partial(self.context.page.call, "server.say")
         if self._shared and context.store.is_edited:
-            say(JOINED_TITLE, [JOINED])
+            say("You are in the shared review as it is now", [JOINED])
             return
         try:
             state, camera, missing = read_page_copy(text, context.scenes.fixed)
         except WarpspaceError as error:
-            say(REFUSED_TITLE, [REFUSED.format(error)])
+            say("This tab could not be restored", [REFUSED.format(error)])
             return
         context.show_opened(state, camera)
-        say(RESTORED_TITLE, [RESTORED, MISSING.format("; ".join(missing))])
+        say("This tab is restored", [RESTORED, f"Not restored: {'; '.join(missing)}."])
