@@ -56,7 +56,6 @@ def marks(picture: LivePicture) -> list[LegendMark]:
 
 
 def marked(picture: LivePicture) -> dict[str, float]:
-    """Return the marked values by name: statistics of the coloured quantity, and the limit."""
     field, values = picture.field, picture.values
     if picture.component != "norm" or picture.quantity == "uncertainty":
         # statistics of the length do not apply to components
@@ -226,7 +225,6 @@ def picture_conditions(picture: LivePicture) -> tuple[str, ...]:
 
 
 def faded_words(picture: LivePicture) -> tuple[str, ...]:
-    """Describe the meaning of faded colours, and their share of the volume."""
     if picture.faded is None:
         return ()
     percent = 100.0 * float(picture.grid.weights[picture.faded].sum())

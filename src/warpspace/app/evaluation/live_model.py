@@ -117,9 +117,9 @@ class LiveModel:
                 key = _place(state), axis, at
                 ((plane, basis),) = self._cache.get(key, partial(build, axis, at), _size)
                 field = self._field(state, plane, basis)
-                about = self._uncertainty(state, plane, field)
-                drawn = {**common, "grid": plane, "field": field, "uncertainty": about}
-                yield model.Slice(**drawn, axis=axis, position_mm=at)
+                known = self._uncertainty(state, plane, field)
+                drawn: dict[str, Any] = {**common, "field": field, "uncertainty": known}
+                yield model.Slice(**drawn, grid=plane, axis=axis, position_mm=at)
 
     def _field(self, state: AppState, of: Grid | TraceGroup, basis: ErrorBasis) -> ErrorField:
         """Evaluate a grid or traces: to first order, or the residual error of a compensation table.

@@ -6,6 +6,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
 
 from warpspace.analysis.commands.contributions import Explanation, PointContribution, explain
 from warpspace.analysis.commands.distance import Distance, DistanceResult
@@ -128,11 +129,9 @@ def pick_line(picture: LivePicture, origin_mm: Array, direction: Array) -> int |
 
 
 def _denser(samples: Array) -> Array:
-    count = samples.shape[1]
-    place = np.linspace(0.0, count - 1.0, (count - 1) * BETWEEN + 1)
-    first = np.minimum(place.astype(int), count - 2)
-    part = (place - first)[:, None]
-    return samples[:, first] * (1.0 - part) + samples[:, first + 1] * part
+    last = samples.shape[1] - 1
+    linear = make_interp_spline(np.arange(last + 1), samples, k=1, axis=1)
+    return linear(np.linspace(0.0, last, last * BETWEEN + 1))
 
 
 def explain_point(state: AppState, picked: Picked, exaggeration: float) -> PointExplanation:

@@ -33,8 +33,6 @@ HEADERS = {
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of one server."""
-
     sessions: int = 64  # open tabs
     # largest message of a page: a picture of the view. A file has 15.5 MB at most.
     message_bytes: int = 16 * 2**20

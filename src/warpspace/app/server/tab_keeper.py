@@ -18,13 +18,7 @@ from functools import partial
 
 import msgspec
 
-from warpspace.app.documents.scene_file import (
-    MAX_LINK,
-    named_link,
-    open_link,
-    open_text,
-    state_to_toml,
-)
+from warpspace.app.documents import scene_file
 from warpspace.app.documents.transfers import safe_name
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.compare import without_table
@@ -50,8 +44,6 @@ def new_token() -> str:
 
 @dataclass(frozen=True, slots=True)
 class TabRecord:
-    """State and camera of a closed tab."""
-
     store: StateStore  # state and history
     camera: CameraMemory | None
 
@@ -114,9 +106,10 @@ def page_copy_text(state: AppState, camera: CameraMemory | None, scenes: Sequenc
     single = replace(bare, comparison=Comparison())
     for candidate in (bare,) if single == bare else (bare, single):
         with suppress(OptionError):
-            file, link = state_to_toml(candidate, camera), named_link(candidate, camera, scenes)
+            file = scene_file.state_to_toml(candidate, camera)
+            link = scene_file.named_link(candidate, camera, scenes)
             left_out = missing if candidate is bare else (*missing, COMPARISON)
-            short = link if link and len(link) <= MAX_LINK else ""
+            short = link if link and len(link) <= scene_file.MAX_LINK else ""
             copy = PageCopy(file, candidate.scene.name, short, left_out)
             text = msgspec.json.encode(copy).decode()
             if len(text) <= MAX_KEPT_TEXT:
@@ -134,10 +127,11 @@ def read_page_copy(
         raise OptionError("the copy in this tab is damaged") from None
     missing = (*NEVER_RESTORED, *copy.missing)
     with suppress(WarpspaceError):
-        state, camera = open_link(copy.link, scenes)
-        if state_to_toml(state, camera) == copy.file:
+        state, camera = scene_file.open_link(copy.link, scenes)
+        if scene_file.state_to_toml(state, camera) == copy.file:
             return state, camera, missing
-    state, camera = open_text(copy.file, safe_name(copy.name, "kept"), "the copy in this tab")
+    name = safe_name(copy.name, "kept")
+    state, camera = scene_file.open_text(copy.file, name, "the copy in this tab")
     return state, camera, (*missing, START_VALUES)
 
 

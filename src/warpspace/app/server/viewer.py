@@ -21,7 +21,7 @@ from typing import Any, Self
 import viser
 
 from warpspace.app.browser.page import page_script
-from warpspace.app.browser.viser_private import connection_of, send_script_to_all, serve_with
+from warpspace.app.browser.viser_private import connection_of, send_script, serve_with
 from warpspace.app.documents.output_services import Services
 from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.drawing.box import surface
@@ -258,7 +258,7 @@ class Viewer:
         self._shared = StateStore(self._start) if shared else None
         self.server = _serve(self.address, self.port, Guard(policy))
         light_scene(self.server.scene)
-        send_script_to_all(self.server, f"{page_script()}\nwarpspacePage.arrive();")
+        send_script(self.server, f"{page_script()}\nwarpspacePage.arrive();")
         self.server.on_client_connect(self._connect)
         self.server.on_client_disconnect(self._disconnect)
         # so that the first tab does not wait for it

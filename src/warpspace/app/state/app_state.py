@@ -106,7 +106,6 @@ class Exclusions:
         return bool(self.excluded or self.only)
 
     def active(self, key: str) -> bool:
-        """Return whether a parameter is not excluded."""
         return key not in self.excluded and (not self.only or key in self.only)
 
     def within(self, keys: Collection[str]) -> "Exclusions":
@@ -115,8 +114,6 @@ class Exclusions:
 
 @dataclass(frozen=True, slots=True)
 class Specification:
-    """Requirements of a design: limit, place of evaluation, tolerances and their costs."""
-
     limit_um: float = described(START_UM, "|E| allowed", span=LIMIT_UM, unit="µm")
     # at one random point of each machine (as in the thesis), or at its worst point (the default)
     over: str = described(

@@ -87,8 +87,6 @@ class Look:
 
 @dataclass(frozen=True, slots=True)
 class MachineLook:
-    """Display of the machine: its bodies, or transparent ones around the volume."""
-
     shown: bool = described(False, "Machine bodies")
     bent: bool = described(
         True,
@@ -109,8 +107,6 @@ class MachineLook:
 
 @dataclass(frozen=True, slots=True)
 class RotaryLook:
-    """Traced points, and positions of the rotary axes that are held."""
-
     # indices into the trace points of the scene
     off: frozenset[str] = described(
         frozenset[str](),

@@ -143,10 +143,7 @@ def _size_bytes(before: AppState, after: AppState) -> int:
     if all(getattr(before, name) is getattr(after, name) for name in _LARGE):
         return 0
     old, new = _sizes(before), _sizes(after)
-    return max(
-        sum(size for key, size in old.items() if key not in new),
-        sum(size for key, size in new.items() if key not in old),
-    )
+    return max(sum(a[key] for key in a.keys() - b.keys()) for a, b in ((old, new), (new, old)))
 
 
 @dataclass(frozen=True, slots=True)
