@@ -8,8 +8,13 @@ from typing import Any
 import numpy as np
 
 from warpspace.analysis.statistics import Statistics
-from warpspace.app.evaluation import scene_overlays
-from warpspace.app.evaluation.scene_overlays import SceneOverlay, T
+from warpspace.app.evaluation.scene_overlays import (
+    SceneOverlay,
+    T,
+    bench_overlay,
+    part_overlay,
+    path_overlay,
+)
 from warpspace.app.state.app_state import AppState
 from warpspace.bench.base import BenchTest
 from warpspace.geometry.colour import ColourScale, component_values
@@ -59,15 +64,15 @@ class LivePicture(Picture):
     @cached_property
     def bench(self) -> SceneOverlay[type[BenchTest]] | None:
         """The path of the selected standard test; None where there is none, or it cannot be run."""
-        return None if self.is_difference else scene_overlays.bench_overlay(self.drawn_state)
+        return None if self.is_difference else bench_overlay(self.drawn_state)
 
     @cached_property
     def part(self) -> SceneOverlay[Workpiece] | None:
-        return self._in_box(scene_overlays.part_overlay)
+        return self._in_box(part_overlay)
 
     @cached_property
     def path(self) -> SceneOverlay[ToolPath] | None:
-        return self._in_box(scene_overlays.path_overlay)
+        return self._in_box(path_overlay)
 
     def _in_box(self, find: Callable[[AppState], SceneOverlay[T] | None]) -> SceneOverlay[T] | None:
         """Evaluate an overlay; for a difference its change; None where there is none."""

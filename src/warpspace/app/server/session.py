@@ -88,9 +88,9 @@ class Display:
 
     def _is_due(self, panel: Panel, picture: LivePicture) -> bool:
         # panels appear and disappear at once
-        if panel.is_visible(picture.state) != (self._rendered.get(panel) is not None):
-            return True
-        return self.scheduler.is_due(panel, picture)
+        was_visible = self._rendered.get(panel) is not None
+        is_changed = panel.is_visible(picture.state) != was_visible
+        return is_changed or self.scheduler.is_due(panel, picture)
 
     def _record(self, picture: LivePicture) -> None:
         self._context.picture = picture

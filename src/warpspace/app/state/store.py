@@ -16,8 +16,9 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from warpspace.app.state.app_state import AppState, Comparison, PageLook
+from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.app.state.leaf import default_of, description, lowered, name_of
+from warpspace.app.state.look import PageLook
 from warpspace.app.state.tree import leaves, stored
 from warpspace.exceptions import OptionError
 
