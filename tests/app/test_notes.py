@@ -9,7 +9,6 @@ from app.frames import new_visitor
 from app.page_tab import SCENES, Tab
 from app.parts import LIVE, Alone
 from warpspace.analysis.note_tables import note_numbers
-from warpspace.app.documents.scene_file import open_link, open_text, state_to_link, state_to_toml
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.drawing.labels import note_labels
 from warpspace.app.evaluation.machine_bodies import drawn_bodies
@@ -152,21 +151,6 @@ def test_flags_stand_where_the_points_asked_about_are_drawn(name):
         wanted = [explain_point(shown, Picked(at), 100.0).drawn_mm for at in points]
         # the box is drawn to first order, a point asked about exactly
         np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-3)
-
-
-def test_notes_survive_file_link_and_undo():
-    part, _ = alone()
-    note = pin(part)
-    state = part.store.state
-    found, camera = open_text(state_to_toml(state, CAMERA), START.scene.name, "a file")
-    assert found.review == state.review
-    assert camera == CAMERA
-    found, _ = open_link(state_to_link(state, CAMERA, None), None)
-    assert found.review == (note,)
-    part.store.undo()
-    assert part.store.state.review == ()
-    part.store.redo()
-    assert part.store.state.review == (note,)
 
 
 @pytest.mark.parametrize("word", ["show", "choose.a1", "keep.a1", "at", "step.b2", "back"])

@@ -181,9 +181,8 @@ def test_a_line_of_a_program_and_its_place_find_each_other(tab):
     picture = LIVE.evaluate(tab.state)
     drawn = picture.path.drawn_mm(picture.exaggeration)
     end = drawn[np.flatnonzero(picture.path.of.line == 3)[-1]]
-    np.testing.assert_allclose(
-        tab.drawn("/program/line"), drawn[np.flatnonzero(picture.path.of.line == 4)[-1:]], atol=0.1
-    )
+    marked = drawn[np.flatnonzero(picture.path.of.line == 4)[-1:]]
+    np.testing.assert_allclose(tab.drawn("/program/line"), marked, atol=0.1)
     eye = end + np.array([0.0, -500.0, 0.0])
     assert pick_line(picture, eye, end - eye) == 3
     assert tab.errors == []

@@ -82,9 +82,8 @@ def test_a_leaf_takes_what_people_type_and_says_what_it_does_not(path, text, kep
     assert spell(state, path) == kept
     assert note in "; ".join(state.notes)
     assert bool(note) is bool(state.notes)
-    assert bool(changes(FIRST, state.without_notes())) is (
-        spell(FIRST, path) != kept and not path.startswith("page")
-    )
+    is_step = spell(FIRST, path) != kept and not path.startswith("page")
+    assert bool(changes(FIRST, state.without_notes())) is is_step
 
 
 def test_what_follows_a_leaf_follows_it_and_members_come_and_go():
@@ -144,12 +143,9 @@ def moved(key, value):
 def test_undo_and_redo_name_what_they_do_and_notes_are_not_kept(store):
     assert "clamped" in store.apply(moved("EAX", 1e9))[0]
     assert store.state.notes == ()
-    assert store.state.amplitudes["EAX"] == MAX_ERROR
-    assert FIRST.amplitudes["EAX"] != MAX_ERROR
     assert store.undo() == "roll of X"
-    assert store.state == FIRST
     assert store.redo() == "roll of X"
-    assert store.state.amplitudes["EAX"] == MAX_ERROR
+    assert store.state == FIRST.with_amplitude("EAX", MAX_ERROR)
     assert store.redo() == ""
 
 
@@ -267,9 +263,8 @@ def test_a_curve_moves_amplitude_slider_and_picture():
 
 
 def test_the_centre_of_a_tolerance_stays_and_that_of_the_scene_comes_back():
-    assert edits.with_scene_tolerances(put(FIRST, "tolerances.EAX", "3")).tolerances == (
-        FIRST.scene.tolerances
-    )
+    changed = edits.with_scene_tolerances(put(FIRST, "tolerances.EAX", "3"))
+    assert changed.tolerances == FIRST.scene.tolerances
     proposed = start_state(load_scene("dvf5000_proposed"))
     assert put(proposed, "tolerances.EAX", "1").tolerances.get("EAX").centre == -8.0
 
@@ -327,9 +322,8 @@ def test_two_tabs_that_exclude_errors_and_write_notes_undo_their_own(tabs):
     mine, yours = tabs
     for number, store in enumerate((mine, yours)):
         note = Note(text=f"{number}", author="", id=f"n{number}")
-        store.apply(
-            lambda state, key=f"E{'AB'[number]}X": put(state, "exclusions.excluded", f"+{key}")
-        )
+        excluded = put(store.state, "exclusions.excluded", f"+E{'AB'[number]}X")
+        store.apply(lambda _, state=excluded: state)
         store.apply(lambda state, note=note: replace(state, review=with_note(state.review, note)))
     for _ in range(2):
         mine.undo()

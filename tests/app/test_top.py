@@ -88,7 +88,7 @@ def test_a_link_that_notes_make_too_large_leaves_them_out_and_says_so():
         window = Alone(FilesDialog, replace(STATE, review=tuple(notes[:count])))
         window.do("share")
         opened, _ = open_link(unpack(window.called[-1][1]), None)
-        assert len(opened.review) == expected
+        assert opened.review == tuple(notes[:expected])
         assert ["Notes not included" in one[0] for one in window.said] == [True] * (1 - expected)
         assert len(window.store.state.review) == count
 
