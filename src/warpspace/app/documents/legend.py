@@ -145,11 +145,9 @@ def numbers_words(picture: LivePicture) -> str:
 
 def place_words(picture: LivePicture) -> str:
     """Format the place of the max: ``at X 275 Y −225 Z −480``."""
-    node, grid = int(np.argmax(picture.field.norm_um)), picture.grid
-    at = {
-        name: float(np.broadcast_to(values, grid.shape).flat[node])
-        for name, values in grid.coordinates.items()
-    }
+    node = np.unravel_index(int(np.argmax(picture.field.norm_um)), picture.shape)
+    positions = picture.grid.coordinates.items()
+    at = {name: float(np.broadcast_to(values, picture.shape)[node]) for name, values in positions}
     axes = formatting.point_axes(picture.drawn_state.scene, at)
     return f"at {formatting.list_axes(axes)}" if axes else ""
 

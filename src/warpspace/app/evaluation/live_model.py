@@ -93,9 +93,8 @@ class LiveModel:
             return None
 
         def build() -> FieldUncertainty | None:
-            return field_uncertainty(
-                scene, field.error_um, grid.coordinates, state.view(), grid.point_mm
-            )
+            at, point_mm = grid.coordinates, grid.point_mm
+            return field_uncertainty(scene, field.error_um, at, state.view(), point_mm)
 
         key = "uncertainty", Identity(grid), _place(state)
         uncertainty = self._cache.get(key, build, lambda built: 3 * built.response.nbytes)

@@ -148,14 +148,13 @@ def explain_point(state: AppState, picked: Picked, exaggeration: float) -> Point
         side = "workpiece" if loop is Loop.WORKPIECE else "tool"
         pose = branch_pose(model, side, coordinates)
         point, shift = transforms.apply(pose, np.asarray(picked.point_mm)), np.zeros(3)
-    explanation = explain(model, scene.errors, coordinates, state.view(loop), point)
-    drawn_um = explanation.error_um
+    view = state.view(loop)
+    explanation = explain(model, scene.errors, coordinates, view, point)
+    nominal, drawn_um = explanation.nominal_mm, explanation.error_um
+    uncertainty = field_uncertainty(scene, drawn_um, coordinates, view, nominal)
     if state.controller is not None:
-        nominal = explanation.nominal_mm
         drawn_um = state.controller.field(coordinates, nominal, scene, loop, nominal).error_um
-    drawn, view = deform(explanation.nominal_mm + shift, drawn_um, exaggeration), state.view(loop)
-    error, nominal = explanation.error_um, explanation.nominal_mm
-    uncertainty = field_uncertainty(scene, error, coordinates, view, nominal)
+    drawn = deform(nominal + shift, drawn_um, exaggeration)
     return PointExplanation(at, loop, explanation, shift, drawn, drawn_um, uncertainty)
 
 
