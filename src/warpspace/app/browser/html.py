@@ -52,7 +52,7 @@ def tag(name: str, body: object = "", **values: object) -> Markup:
 
 def button(
     label: object,
-    do: str | None,
+    do: str,
     value: object = None,
     *,
     kind: str = "",
@@ -73,8 +73,10 @@ def upload_button(
     label: str, part: str, most_bytes: int, endings: str, *, hint: str, kind: str = ""
 ) -> Markup:
     """Render a button that opens a file chooser; the files arrive as events ``panel:file``."""
-    return button(label, None, kind=kind, hint=hint, data_upload=part, data_most=most_bytes,
-                  data_accept=endings)  # fmt: skip
+    return tag(
+        "button", label, type="button", class_=f"ws-button {kind}".strip(), data_upload=part,
+        data_most=most_bytes, data_accept=endings, title=hint,
+    )  # fmt: skip
 
 
 def number(value: float, digits: int = 1) -> str:
