@@ -11,7 +11,8 @@ from app.page_tab import SCENES, Tab, wait_until_open
 from app.wire import end_work
 from warpspace.app.documents.scene_file import state_to_toml
 from warpspace.app.server.viewer import Viewer
-from warpspace.app.state.app_state import TASKS, start_state
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.look import TASKS
 
 START = start_state(SCENES[0])
 TITLES = ["Deformed volume", "Errors", "Five tasks"]

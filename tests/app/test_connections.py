@@ -22,9 +22,9 @@ from warpspace.app.server.tab_keeper import (
     MAX_CLOSED_TABS,
     MAX_HISTORY_BYTES,
     RETENTION_S,
+    TAB_TOKEN,
     TabMemory,
     TabRecord,
-    is_token,
     new_token,
 )
 from warpspace.app.server.viewer import free_port, is_local, page_url, resolve_host
@@ -158,7 +158,7 @@ def test_a_tab_that_is_closed_leaves_only_its_record():
     "text", ["", "abc", "x" * 32, "0" * 33, "A" * 32, "../" * 10, "<script>", "0" * 31 + "\n"]
 )
 def test_what_is_no_token_is_refused(text):
-    assert not is_token(text)
+    assert TAB_TOKEN.fullmatch(text) is None
 
 
 def test_only_so_many_files_wait_at_once():

@@ -287,7 +287,7 @@ def test_the_size_of_messages_is_limited(limited, caplog):
 
 def test_a_rate_may_be_exceeded_for_a_moment():
     now = [0.0]
-    rate = Rate(10.0, 5, lambda: now[0])
+    rate = Rate(Limits(messages_per_second=10.0, burst=5), lambda: now[0])
     for at, taken in ((0.0, 5), (0.25, 2), (1000.0, 5)):
         now[0] = at
         assert [rate.take() for _ in range(taken + 1)] == [True] * taken + [False]

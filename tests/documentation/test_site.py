@@ -17,7 +17,7 @@ from doc_pages import DOCS, ROOT, anchors, blocks, entries, links, pages, sectio
 from warpspace.app.panels.page_panels import build_panels
 from warpspace.app.panels.panel import Section
 from warpspace.app.panels.top_bar import COMMANDS as KEYS
-from warpspace.app.state.app_state import TASKS
+from warpspace.app.state.look import TASKS
 from warpspace.cli.main import COMMANDS
 from warpspace.kinematics.model import convention_names
 from warpspace.machine.curves.registry import curve_kinds

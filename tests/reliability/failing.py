@@ -116,7 +116,9 @@ class Review:
             self.shown("EXX", value)
         for wire in self.wires:
             wire.toasts.clear()
-        if not self.until(lambda _: all(one.display.due_in_s is None for one in self.sessions)):
+        if not self.until(
+            lambda _: all(one.display.scheduler.due_in_s is None for one in self.sessions)
+        ):
             faults.append("the tabs do not come to rest")
         time.sleep(0.05)  # the last part may still be written
         with failing(stage, raised):

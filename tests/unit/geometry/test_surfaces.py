@@ -131,9 +131,10 @@ def test_a_point_becomes_a_cube_around_it():
 def test_a_ray_hits_the_near_face_of_a_box_or_the_nearest_point():
     surface, origin = outer_surface((4, 4, 4)), np.array([0.3, -5.0, 0.6])
     vertices = grid_points((4, 4, 4))[surface.nodes] / 3.0
-    hit = pick_surface(origin, np.array([0.0, 1.0, 0.0]), vertices, surface.triangles)
-    np.testing.assert_allclose(hit.weights @ vertices[hit.vertices], [0.3, 0.0, 0.6], atol=1e-12)
-    assert hit.distance == pytest.approx(5.0)
+    direction = np.array([0.0, 1.0, 0.0])
+    at, weights, distance = pick_surface(origin, direction, vertices, surface.triangles)
+    np.testing.assert_allclose(weights @ vertices[at], [0.3, 0.0, 0.6], atol=1e-12)
+    assert distance == pytest.approx(5.0)
     for beside in ([0.0, -1.0, 0.0], [1.0, 1.0, 0.0]):
         assert pick_surface(origin, np.array(beside), vertices, surface.triangles) is None
     points, ray = np.array([[0.0, 10.0, 0.0], [0.0, 10.0, 1.0]]), np.array([0.0, 1.0, 0.01])

@@ -28,7 +28,7 @@ from warpspace.app.panels.panel import Context, Panel, Section
 from warpspace.app.panels.part_panels import PartPanel, ProgramPanel
 from warpspace.app.panels.toolbar import ComparePanel, ControlsPanel
 from warpspace.app.panels.top_bar import HelpDialog, PagePanel, ScenesDialog, StatePanel, TopPanel
-from warpspace.app.state.app_state import TASKS
+from warpspace.app.state.look import TASKS
 
 PANELS: dict[str, type[AnalysisPanel]] = {
     "calibrate": CalibratePanel, "adjust": AdjustPanel, "compensate": CompensatePanel,
