@@ -19,32 +19,16 @@ from markupsafe import Markup
 from warpspace.analysis.description import Analysis, Change, Result
 from warpspace.analysis.options import Option
 from warpspace.analysis.registry import Entry
-from warpspace.app.browser.html import (
-    EMPTY,
-    button,
-    choice,
-    field,
-    join,
-    number,
-    rows,
-    switch,
-    tag,
-    text_box,
-)
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, field, join, tag, text_box
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
+from warpspace.app.evaluation import compare
 from warpspace.app.evaluation.cache import exclusive_work
-from warpspace.app.evaluation.compare import (
-    applied,
-    plain_state,
-    with_applied,
-    with_proposal,
-    without_table,
-)
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import block_html, result_html
 from warpspace.app.panels.file_dialogs import PLAIN
-from warpspace.app.panels.panel import Context, Job, Jobs, Section
+from warpspace.app.panels.panel import Context, Job, Jobs, Section, actions, alert, details
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import LONGEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
@@ -167,7 +151,7 @@ class AnalysisPanel(Section):
         """Render the buttons below a result."""
         saves = [button(f"Save {end}", f"{self.name}:save", end) for end in _endings(result)]
         saves.append(button("Add to report", f"{self.name}:report", kind="quiet"))
-        return tag("div", join(saves), class_="ws-actions")
+        return actions(*saves)
 
     # --- the page --------------------------------------------------------------------------------
 
@@ -215,7 +199,7 @@ class AnalysisPanel(Section):
     def problem_html(self, state: AppState) -> Markup:
         if self.problem is None or self.problem[0] != self.result_key(state):
             return EMPTY
-        return tag("p", self.problem[1], class_="ws-problem", role="alert")
+        return alert(self.problem[1])
 
     def cards_html(self, key: ResultKey) -> Markup:
         outcome, cards = self.outcome, list[Markup]()
@@ -230,7 +214,7 @@ class AnalysisPanel(Section):
                        disabled=outcome.key != key)
                 for label, hint in hints.items()
             )  # fmt: skip
-            row = tag("div", buttons, class_="ws-actions")
+            row = actions(buttons)
             cards.append(tag("div", outcome.cards[index][1] + row, class_="ws-card"))
         return join(cards)
 
@@ -243,9 +227,8 @@ class AnalysisPanel(Section):
             _control(f"{self.name}:set.{option.name}", option, values.get(option.name), state.scene)
             for option in options
         )
-        return tag("details", tag("summary", "Options") + form, class_="ws-options",
-                   open=bool(self.problem_html(state)),
-                   data_key=f"{self.name}.options")  # fmt: skip
+        is_open, key = bool(self.problem_html(state)), f"{self.name}.options"
+        return details("Options", form, open=is_open, data_key=key)
 
     # --- events --------------------------------------------------------------------------------
 
@@ -266,8 +249,10 @@ class AnalysisPanel(Section):
                 return state
             if action == "preview":
                 name = change.label if change.label.startswith("after ") else ""
-                return with_proposal(state, change.scene, name or f"after {title}: {change.label}")
-            applied_state = with_applied(state, change.scene, f"before {title}")
+                return compare.with_proposal(
+                    state, change.scene, name or f"after {title}: {change.label}"
+                )
+            applied_state = compare.with_applied(state, change.scene, f"before {title}")
             self._applied_key = self.result_key(applied_state)
             description = change.label
             if description.startswith("after "):
@@ -354,13 +339,13 @@ def _endings(result: Result) -> tuple[str, ...]:
 
 
 def _change_html(state: AppState, change: Change) -> Markup:
-    before_state = without_table(plain_state(state))
-    after_state = applied(before_state, change.scene)
+    before_state = compare.without_table(compare.plain_state(state))
+    after_state = compare.applied(before_state, change.scene)
     moved: list[tuple[float, str]] = []
     for key in {**before_state.amplitudes, **after_state.amplitudes}:
         a, b = (state.amplitudes.get(key, 0.0) for state in (before_state, after_state))
         if abs(b - a) > SAME:
-            line = f"{key} {number(a)} → {number(b)} {parameter(key).unit}"
+            line = f"{key} {html.number(a)} → {html.number(b)} {parameter(key).unit}"
             moved.append((-abs(b - a), line))
     steps = [line for _, line in sorted(moved)] or [change.label]
     lines = [tag("div", tag("b", line)) for line in steps[:MOST_STEPS]]
@@ -372,20 +357,24 @@ def _change_html(state: AppState, change: Change) -> Markup:
     except WarpspaceError:
         return join(lines)
     pairs = (("max", before.max_um, after.max_um), ("mean", before.mean_um, after.mean_um))
-    return join(lines) + rows((name, f"{number(a)} → {number(b)} µm") for name, a, b in pairs)
+    return join(lines) + html.rows(
+        (name, f"{html.number(a)} → {html.number(b)} µm") for name, a, b in pairs
+    )
 
 
 def _control(name: str, option: Option, text: str | None, scene: Scene) -> Markup:
     hint, default = f"{option.about}.", option.default_words
     metavar = option.grammar and option.grammar.metavar
     if option.kind is bool:
-        return switch(name, option.label, hint=hint, on=(text or str(int(option.default))) == "1")
+        return html.switch(
+            name, option.label, hint=hint, on=(text or str(int(option.default))) == "1"
+        )
     if option.choices or metavar == "AXIS":
         keys = option.choices or tuple(scene.machine.axes)
         titles = {key: option.choice_labels.get(key, re.sub("[_-]", " ", key)) for key in keys}
         if not option.default:
             titles = {UNSET: default or "automatic", **titles}
-        control = choice(name, str(option.default or UNSET) if text is None else text, titles)
+        control = html.choice(name, str(option.default or UNSET) if text is None else text, titles)
         return field(option.label, control, name, option.unit, hint)
     if option.low is not None and option.high is not None:
         hint += f" Range: {option.low:g} to {option.high:g}"

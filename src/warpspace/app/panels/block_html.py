@@ -8,17 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from markupsafe import Markup
 
-from warpspace.analysis.blocks import (
-    Bars,
-    Block,
-    Column,
-    Curve,
-    Histogram,
-    Lines,
-    Table,
-    blocks_html,
-)
+from warpspace.analysis import blocks
+from warpspace.analysis.blocks import Bars, Block, Curve, Lines, Table
 from warpspace.app.browser.html import EMPTY, fill, join, number, tag
+from warpspace.app.panels.panel import details, tiny
 from warpspace.bench.base import SMALLEST_DEVIATION, lay_polar
 from warpspace.geometry.colour import tick_values
 from warpspace.units import MINUS, THIN_SPACE, Array, spell_short
@@ -55,8 +48,7 @@ def details_html(blocks: Iterable[Block], title: str = "Details") -> Markup:
     if not inner:
         return EMPTY
     wide = tag("div", inner, tabindex=0, role="group", aria_label=title)  # scrolled by keys
-    return tag("details", tag("summary", title) + wide, class_="ws-details",
-               data_key=f"details.{title}")  # fmt: skip
+    return details(title, wide, kind="details", data_key=f"details.{title}")
 
 
 def block_html(block: Block) -> Markup:
@@ -64,9 +56,9 @@ def block_html(block: Block) -> Markup:
         return tag("p", spelt(block))
     if isinstance(block, Lines):
         return lines_html(block)
-    if isinstance(block, Histogram):
+    if isinstance(block, blocks.Histogram):
         return histogram_html(block)
-    return Markup(re.sub(r">-(?=\d)", f">{MINUS}", blocks_html([block])))  # noqa: S704 - escaped
+    return Markup(re.sub(r">-(?=\d)", f">{MINUS}", blocks.blocks_html([block])))  # noqa: S704 - escaped
 
 
 def spelt(sentence: str) -> str:
@@ -84,7 +76,7 @@ def _transposed(table: Table) -> Table:
         return table
     (first, *names), *lines = zip(table.visible_columns, *table.cells(), strict=True)
     form = "s" if all(one.is_number for one, *_ in lines) else ""
-    columns = (Column(first.heading), *(Column(name, form) for name in names))
+    columns = (blocks.Column(first.heading), *(blocks.Column(name, form) for name in names))
     lines = [(" ".join(filter(None, (one.heading, one.unit))), *cells) for one, *cells in lines]
     return replace(table, columns=columns, rows=lines, marks=())
 
@@ -99,7 +91,7 @@ def _first_bars(bars: Bars) -> Markup:
              value=number(value, 2), share=number(100.0 * abs(value) / longest))
         for label, value in zip(bars.rows, values, strict=True) if value is not None
     ]  # fmt: skip
-    head = tag("p", " · ".join(filter(None, (panel.title, panel.unit))), class_="ws-tiny")
+    head = tiny(" · ".join(filter(None, (panel.title, panel.unit))))
     return head + join(lines[:MOST_BARS])
 
 
@@ -168,7 +160,7 @@ def lines_html(chart: Lines) -> Markup:
     return _figure(chart, frame.axes(chart.x_label, chart.y_label) + curves)
 
 
-def histogram_html(chart: Histogram) -> Markup:
+def histogram_html(chart: blocks.Histogram) -> Markup:
     """Draw a distribution with its limit."""
     limit = math.inf if chart.limit is None else chart.limit
     ends = float(chart.edges[0]), max(float(chart.edges[-1]), chart.limit or 0.0)
@@ -198,7 +190,7 @@ def _figure(
     key = join(
         tag("span", one.name, class_=f"ws-s{one.colour % SERIES} ws-{one.style}") for one in named
     )
-    note = tag("p", chart.note, class_="ws-tiny") if chart.note else EMPTY
+    note = tiny(chart.note) if chart.note else EMPTY
     svg = _svg(inner, f"{chart.title}: {chart.y_label}", box, kind)
     key = tag("div", join((key, rings)), class_="ws-key ws-tiny")
     return tag("figure", tag("figcaption", chart.title) + svg + key + note)

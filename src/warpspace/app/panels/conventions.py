@@ -13,7 +13,7 @@ from markupsafe import Markup
 
 from warpspace.app.browser.html import EMPTY, button, field, fill, join, number, tag, text_box
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.panel import Section
+from warpspace.app.panels.panel import Section, actions, details, tiny
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import linear_spans
@@ -284,8 +284,8 @@ class ConventionsSection(Section):
         lines.append(_row("all choices together", effects["all"]))
         reset = button("Reset to the scene", "conventions:own", disabled=in_force == scene_choices)
         return join((
-            tag("table", join(lines), class_="ws-choices-table"), tag("p", NOTE, class_="ws-tiny"),
-            _reference(state), tag("div", reset, class_="ws-actions"), _wrong(state),
+            tag("table", join(lines), class_="ws-choices-table"), tiny(NOTE),
+            _reference(state), actions(reset), _wrong(state),
         ))  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -313,7 +313,7 @@ def _reference(state: AppState) -> Markup:
     box = field("Reference point", text_box(name, text), name, hint="Axis positions")
     nowhere = state.picked is None or state.picked.point_mm is not None
     pick = button("Use the clicked point", "conventions:pick", hint=hint, disabled=nowhere)
-    return box + tag("div", pick, class_="ws-actions")
+    return box + actions(pick)
 
 
 def _row(label: object, effect: Effect | None) -> Markup:
@@ -326,6 +326,5 @@ def _wrong(state: AppState) -> Markup:
     scene = state.active_scene()
     costs = convention_costs(scene, scene.view(state.loop), state.nodes)
     rows = [_row(label, costs.get(name)) for name, label in COSTS.items()]
-    summary = tag("summary", "Effect of data measured in another convention")
-    note = tag("p", COST_NOTE, class_="ws-tiny")
-    return tag("details", join((summary, note, tag("table", join(rows)))), class_="ws-options")
+    heading = "Effect of data measured in another convention"
+    return details(heading, tiny(COST_NOTE), tag("table", join(rows)))

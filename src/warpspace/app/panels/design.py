@@ -16,23 +16,13 @@ from warpspace.analysis.options import Option, read_numbers
 from warpspace.analysis.sampling.cases import Case, Reduction, SamplingPlan
 from warpspace.analysis.sampling.distribution import Distribution, Draws, Probability, Stream
 from warpspace.analysis.sampling.tolerance_search import Ensemble, build_ensemble
-from warpspace.app.browser.html import (
-    EMPTY,
-    button,
-    choice,
-    fill,
-    join,
-    number,
-    rows,
-    slider,
-    tag,
-    text_box,
-)
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, fill, join, number, tag
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.machine_edits import library
 from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import histogram_html
-from warpspace.app.panels.panel import setting
+from warpspace.app.panels.panel import alert, setting, tiny
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.leaf import Identity
@@ -124,7 +114,7 @@ class TolerancesPanel(AnalysisPanel):
         try:
             return controls + self._probability(sample_machines(state), state)
         except WarpspaceError as error:
-            return controls + tag("p", str(error), class_="ws-problem", role="alert")
+            return controls + alert(str(error))
 
     def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
         controls = _controls(state, "over", "distribution", "costs")
@@ -151,7 +141,7 @@ class TolerancesPanel(AnalysisPanel):
             f" largest {number(stream.max_um)} µm; {spell_count(stream.count)} machines,"
             f" 95 % confidence {percent(probability.low)} … {percent(probability.high)} %"
         )
-        return headline + histogram_html(chart) + tag("p", numbers, class_="ws-tiny")
+        return headline + histogram_html(chart) + tiny(numbers)
 
     def _rows(self, ensemble: Ensemble, state: AppState) -> Markup:
         shares = tolerance_shares(ensemble, state.tolerances)
@@ -191,9 +181,9 @@ def _row(state: AppState, key: str, share: float, longest: float) -> Markup:
         "{unit}</span>{fixed}</div></div>",
         name=name, code=key, words=row.name, share=number(100.0 * share),
         length=f"{100.0 * share / longest:.1f}", unit=row.unit,
-        slider=slider(name, width, span.low, span.high, span.step, twin=name,
+        slider=html.slider(name, width, span.low, span.high, span.step, twin=name,
                       label=f"Half-width of {key}", text=f"±{width:g} {row.unit}"),
-        box=text_box(name, spell_typed(width), label=f"Half-width of {key} in {row.unit}",
+        box=html.text_box(name, spell_typed(width), label=f"Half-width of {key} in {row.unit}",
                      size="short", inputmode="decimal"),
         fixed=button("fixed" if is_fixed else "fix", "state:set.specification.fixed",
                      f"{'-' if is_fixed else '+'}{key}", kind="link", pressed=is_fixed,
@@ -321,9 +311,9 @@ class ConceptsPanel(AnalysisPanel):
                 title, buttons = key, open_button + remove_button
             lines.append((tag("b", f"{letter} ") + title, buttons))
         remaining = {key: key for key in offers if key not in chosen}
-        add = choice(f"{self.name}:set.add", "", {"": ADD, **remaining},
+        add = html.choice(f"{self.name}:set.add", "", {"": ADD, **remaining},
                      label="Compare with another machine")  # fmt: skip
-        machines = rows(lines) if self.is_ready(state) else EMPTY
+        machines = html.rows(lines) if self.is_ready(state) else EMPTY
         return (add if len(chosen) < MOST_CONCEPTS else EMPTY) + machines
 
     def actions(self, result: Result, *, stale: bool) -> Markup:
@@ -364,4 +354,4 @@ class ConceptsPanel(AnalysisPanel):
             "Drawing the machines",
             lambda job: draw(scenes, result.analysis, dark, job),
             partial(self.context.save_file, "concepts.png"),
-        )  # fmt: skip
+        )

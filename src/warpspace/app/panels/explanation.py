@@ -9,17 +9,8 @@ from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.analysis.commands.contributions import PointContribution
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.analysis.uncertainty.propagation import NAMES
-from warpspace.app.browser.html import (
-    EMPTY,
-    button,
-    field,
-    join,
-    number,
-    rows,
-    signed,
-    tag,
-    text_box,
-)
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, join, number, rows, signed, tag
 from warpspace.app.drawing.camera import fit_camera
 from warpspace.app.evaluation.compare import without_words
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -34,7 +25,7 @@ from warpspace.app.evaluation.point_explanation import (
 )
 from warpspace.app.panels.analysis_panel import AnalysisPanel
 from warpspace.app.panels.block_html import block_html
-from warpspace.app.panels.panel import Section, actions
+from warpspace.app.panels.panel import Section, actions, details, quiet, tiny
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.tree import EXAMPLE, put
 from warpspace.field.evaluate import placed_words
@@ -73,7 +64,7 @@ class WorstPanel(Section):
 
     def body(self, picture: LivePicture) -> Markup:
         if picture.is_difference:
-            return tag("p", DIFFERENCE, class_="ws-quiet")
+            return quiet(DIFFERENCE)
         explanation, controls = self._explain(picture), EMPTY
         if picture.state.picked is not None:
             reset = button("Worst point", "worst:forget", kind="link",
@@ -83,10 +74,10 @@ class WorstPanel(Section):
             controls = tag("p", join((_axes(explanation), " ", reset, " ", pin)))
         best = tag("div", "", data_piece="best")
         limit = picture.state.specification.limit_um
-        details = tag("summary", "Details") + _details(explanation, picture.state.lever)
-        details = tag("details", details, class_="ws-details", data_key="worst.details")
+        table = _details(explanation, picture.state.lever)
         return join((
-            controls, _contributions(explanation), _uncertainty(explanation, limit), best, details,
+            controls, _contributions(explanation), _uncertainty(explanation, limit), best,
+            details("Details", table, kind="details", data_key="worst.details"),
         ))  # fmt: skip
 
     def _explain(self, picture: LivePicture) -> PointExplanation:
@@ -143,7 +134,7 @@ def _contributions(explanation: PointExplanation) -> Markup:
         label = f"{n_others} more" if n_others else "second order"
         lines.append((tag("span", label, class_="ws-quiet"), signed(remainder_um)))
     if not lines:
-        return tag("p", "No error acts at this point.", class_="ws-quiet")
+        return quiet("No error acts at this point.")
     note = EMPTY
     if explanation.is_corrected:
         residual = number(float(np.linalg.norm(explanation.drawn_um)))
@@ -159,7 +150,7 @@ def _uncertainty(explanation: PointExplanation, limit_um: float) -> Markup:
     uncertainty = explanation.uncertainty
     if uncertainty is None or not uncertainty.errors.is_known:
         remarks = [] if uncertainty is None else uncertainty.errors.remarks()
-        return join(tag("p", remark, class_="ws-tiny") for remark in remarks)
+        return join(tiny(remark) for remark in remarks)
     variances = uncertainty.variance_shares(uncertainty.response @ uncertainty.direction)
     shares = [(key, f"{number(100.0 * share, 0)} %") for key, share in variances.items()]
     shares = [(key, share) for key, share in shares if share != "0 %"]
@@ -169,11 +160,10 @@ def _uncertainty(explanation: PointExplanation, limit_um: float) -> Markup:
         f"|E| ≤ {limit_um:g} µm with a probability of {probability} %."
         f" U95{length_words(uncertainty)} µm; variance shares: {largest}"
     )
-    more_shares = EMPTY
-    if len(shares) > FIRST:
-        more_shares = tag("details", tag("summary", "All shares") + rows(shares[FIRST:]),
-                     class_="ws-details", data_key="worst.shares")  # fmt: skip
-    return tag("p", text, class_="ws-tiny") + more_shares
+    if len(shares) <= FIRST:
+        return tiny(text)
+    table = rows(shares[FIRST:])
+    return tiny(text) + details("All shares", table, kind="details", data_key="worst.shares")
 
 
 def _details(explanation: PointExplanation, lever: str) -> Markup:
@@ -193,13 +183,13 @@ def _details(explanation: PointExplanation, lever: str) -> Markup:
     place = spell_in_r(point.nominal_mm + explanation.shift_mm)
     tilt = number(float(np.linalg.norm(point.orientation_urad)))
     loop = LOOP_WORDS[explanation.loop]
-    box = text_box("worst:set.at", _axes(explanation), placeholder=EXAMPLE)
+    box = html.text_box("worst:set.at", _axes(explanation), placeholder=EXAMPLE)
     return tag("div", join((
-        field("Point", box, "worst:set.at",
+        html.field("Point", box, "worst:set.at",
               hint="Axis positions; or click a point of the map or of a trace"),
-        tag("p", f"{place} mm · {loop} · tilt {tilt} µrad", class_="ws-tiny"),
+        tiny(f"{place} mm · {loop} · tilt {tilt} µrad"),
         block_html(Table(columns, lines)), *(_lever(c) for c in ranked if c.key == lever),
-        tag("p", ELSEWHERE, class_="ws-tiny"),
+        tiny(ELSEWHERE),
         button("Copy", "worst:copied", kind="quiet", data_copy=f"key\talong\tx\ty\tz\n{copied}",
                hint="Copy the table for a spreadsheet"),
     )))  # fmt: skip
@@ -238,7 +228,7 @@ class DistancePanel(AnalysisPanel):
             buttons.append(button("Pin", "notes:pin", "\n".join(drawn[0].lines()),
                                   hint="Pin a note with these numbers"))  # fmt: skip
         status = tag("p", POINTS[point], role="status") if point else EMPTY
-        return actions(*buttons) + status + tag("p", without_words(state), class_="ws-tiny")
+        return actions(*buttons) + status + tiny(without_words(state))
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action not in ("pick", "stop", "clear"):
@@ -275,4 +265,4 @@ class VolumePanel(Section):
         ]
         at = spell_axes(statistics.max_at_axes).removeprefix("axes ")
         where = f"max at {at} · {spell_in_r(statistics.max_at_mm)} mm"
-        return rows(lines) + tag("p", where, class_="ws-tiny")
+        return rows(lines) + tiny(where)

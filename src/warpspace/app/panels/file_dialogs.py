@@ -16,7 +16,7 @@ from warpspace.app.documents.offline_page import build_offline_html, build_story
 from warpspace.app.evaluation.compare import drawn_tables, without_table
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.panel import Context, Dialog, Job, Jobs, actions, setting
+from warpspace.app.panels.panel import Context, Dialog, Job, Jobs, actions, quiet, setting
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
@@ -99,7 +99,7 @@ class FilesDialog(JobDialog):
             tag("p", "Current errors, tolerances and machine, with display settings and camera."),
             actions(button("Save scene (TOML)", "files:save", kind="main", hint="Ctrl+S")),
             *(link if services.token else ()),
-            tag("h3", "Picture"), tag("p", transfers.exported_words(picture), class_="ws-quiet"),
+            tag("h3", "Picture"), quiet(transfers.exported_words(picture)),
             actions(button("Save current view (PNG)", "files:view")),
             field("Figure", kinds, "state:set.page.figure"),
             actions(button("Save figure (PNG)", "files:figure")),
@@ -292,7 +292,7 @@ class ReportDialog(JobDialog):
             self._jobs.html(),
             tag("h3", "Contents"),
             tag("ul", join((*(tag("li", chapter) for chapter in ALWAYS), *added))),
-            tag("p", hint, class_="ws-quiet"),
+            quiet(hint),
         ))  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:

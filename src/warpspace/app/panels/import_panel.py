@@ -23,7 +23,7 @@ from warpspace.app.browser.html import EMPTY, tag, upload_button
 from warpspace.app.panels.block_html import details_html
 from warpspace.app.panels.file_dialogs import accepted_endings
 from warpspace.app.panels.measurement import FilesPanel, UploadedFile
-from warpspace.app.panels.panel import Context
+from warpspace.app.panels.panel import Context, actions
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import read_form
 from warpspace.exceptions import WarpspaceError
@@ -202,7 +202,7 @@ class ImportPanel(FilesPanel):
             hint="Files that belong together can be added one after the other",
         )  # fmt: skip
         introduction = EMPTY if self.files else tag("p", INTRODUCTION)
-        return introduction + self.files_html() + tag("div", upload, class_="ws-actions")
+        return introduction + self.files_html() + actions(upload)
 
     def result_html(self, result: Result) -> Markup:
         return details_html(block for block in result.blocks() if not isinstance(block, str))

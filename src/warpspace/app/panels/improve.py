@@ -20,7 +20,7 @@ from warpspace.app.evaluation.compare import pinned_side, with_before, without_t
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.analysis_panel import RECORD, AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import details_html, result_html
-from warpspace.app.panels.panel import Context, Refresh
+from warpspace.app.panels.panel import Context, Refresh, actions, quiet
 from warpspace.app.state.app_state import AppState
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.compensate import Compensation
@@ -73,7 +73,7 @@ class AdjustPanel(AnalysisPanel):
             keys = ", ".join(result.adjustable)
             return tag("p", f"No improvement possible: {keys} have their optimum values.")
         objective = "largest |E|" if result.objective is Objective.MAX else "RMS of |E|"
-        return tag("p", f"Adjustments that minimise the {objective}.", class_="ws-quiet")
+        return quiet(f"Adjustments that minimise the {objective}.")
 
     def offered_changes(self, result: Any) -> Sequence[int]:
         """Return the sets that improve on smaller ones, which come first."""
@@ -119,7 +119,7 @@ class BestPanel(AdjustPanel):
         is_current = outcome is not None and outcome.key == key
         status = "No single adjustment improves it." if is_current else "Searching …"
         body = self.problem_html(state) or self.cards_html(key)
-        body = body or tag("p", status, class_="ws-quiet")
+        body = body or quiet(status)
         body += RECORD if key == self._applied_key else EMPTY
         return {self.name: tag("h4", "Best single adjustment") + body}
 
@@ -177,7 +177,7 @@ class CompensatePanel(AnalysisPanel):
         if chosen:
             return control
         text = "A compensation table for the controller, and the residual error."
-        return control + tag("p", text, class_="ws-quiet")
+        return control + quiet(text)
 
     def headline(self, result: Result) -> Markup:
         return EMPTY
@@ -217,7 +217,7 @@ class CompensatePanel(AnalysisPanel):
         row += [RECORD] if box_of(state) != MACHINE else []
         box_choice = tag("div", tag("span", "Map", class_="ws-quiet") + boxes,
                          class_="ws-actions", role="group", aria_label="Map")  # fmt: skip
-        return tag("div", join(row), class_="ws-actions") + box_choice
+        return actions(*row) + box_choice
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         result = self.outcome.result if self.outcome is not None else None

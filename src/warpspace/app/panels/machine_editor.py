@@ -12,17 +12,8 @@ from markupsafe import Markup
 from PIL import Image
 
 from warpspace.analysis.axis_motion import AxisMotion, assemble_motion
-from warpspace.app.browser.html import (
-    EMPTY,
-    button,
-    choice,
-    field,
-    fill,
-    ident,
-    join,
-    tag,
-    text_box,
-)
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, fill, join, tag, text_box
 from warpspace.app.evaluation import machine_edits
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import (
@@ -32,7 +23,16 @@ from warpspace.app.evaluation.machine_bodies import (
     standing,
 )
 from warpspace.app.panels.block_html import block_html
-from warpspace.app.panels.panel import Context, Dialog, Section, setting
+from warpspace.app.panels.panel import (
+    Context,
+    Dialog,
+    Section,
+    actions,
+    details,
+    quiet,
+    setting,
+    tiny,
+)
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_spans
 from warpspace.app.state.tree import leaves
@@ -62,7 +62,7 @@ class PositionsSection(Section):
         paths = (*(f"positions.{axis}" for axis in state.positions), *linear)
         bars = [setting(state, path, bar=True) for path in paths]
         lines = (position, OPEN_MESH) if is_open else (position,)
-        return join((*bars, *(tag("p", line, class_="ws-tiny") for line in lines)))
+        return join((*bars, *(tiny(line) for line in lines)))
 
 
 # --- Rotary axes: animation, polar plots of one trace, table of all traces ------------------------
@@ -104,7 +104,7 @@ class RotarySection(Section):
         state, stage = picture.state, self.context.stage
         axis, playing, position = played_axis(state), False, NO_POSITIONS
         if axis is None:
-            return tag("p", "This machine has no rotary axis.", class_="ws-quiet")
+            return quiet("This machine has no rotary axis.")
         if stage is not None:
             stage.moved = self._follow
             playing, position = stage.playing, stage.position
@@ -117,7 +117,7 @@ class RotarySection(Section):
             hint, path = "Move the axis to the paused position", f"state:set.positions.{axis}"
             buttons.append(button("Move axes here", path, round(position[axis]), hint=hint))
         return join((
-            tag("div", join(buttons), class_="ws-actions"),
+            actions(*buttons),
             fill('<p data-piece="rotary.angle" class="ws-tiny"></p>'),
             _trace(picture), _points(state, axis),
         ))  # fmt: skip
@@ -140,19 +140,18 @@ class RotarySection(Section):
 def _trace(picture: LivePicture) -> Markup:
     if not picture.state.shown.traces:
         turn_on = button("Show traces", "state:set.shown.traces", "1", kind="main")
-        return tag("div", turn_on, class_="ws-actions")
+        return actions(turn_on)
     moved = picture.moved_traces
     if not moved:
-        return tag("p", NOTHING_MOVED, class_="ws-quiet")
+        return quiet(NOTHING_MOVED)
     name, path = chosen_trace(picture), "state:set.rotary.chosen"
-    chosen = field("Trace", choice(path, name, {trace: trace for trace in moved}), path)
+    chosen = html.field("Trace", html.choice(path, name, {trace: trace for trace in moved}), path)
     motions = {trace: motion_of(picture, moved[trace]) for trace in [*moved][:MOST_ROWS]}
     motion = motions[name] if name in motions else motion_of(picture, moved[name])
-    motion_plots = _motion(motion, name) if motion else tag("p", ON_THE_AXIS, class_="ws-quiet")
+    motion_plots = _motion(motion, name) if motion else quiet(ON_THE_AXIS)
     head = join(fill("<th>{} <small>{}</small></th>", *heading) for heading in HEADS.items())
     table = tag("table", tag("tr", head) + join(starmap(_numbers, motions.items())))
-    parts = tag("summary", "Table of all traces") + tag("p", AVERAGE, class_="ws-tiny") + table
-    return chosen + motion_plots + tag("details", parts, class_="ws-options")
+    return chosen + motion_plots + details("Table of all traces", tiny(AVERAGE), table)
 
 
 def _numbers(name: str, motion: AxisMotion | None) -> Markup:
@@ -190,10 +189,10 @@ def _motion(motion: AxisMotion, name: str) -> Markup:
     for part in motion.motions:
         chart = motion_lines(part.name, motion, part)
         plots.append(block_html(replace(chart, title=part.name, note="")))
-        notes.append(tag("p", f"{part.iso}: {chart.note}.", class_="ws-tiny"))
+        notes.append(tiny(f"{part.iso}: {chart.note}."))
     label = f"Error motion of {name}"
     drawn = tag("div", join(plots), class_="ws-plots", role="group", aria_label=label)
-    return join((drawn, fill(KEY), *notes, tag("p", ABOUT, class_="ws-tiny")))
+    return join((drawn, fill(KEY), *notes, tiny(ABOUT)))
 
 
 def _points(state: AppState, played: str) -> Markup:
@@ -202,7 +201,7 @@ def _points(state: AppState, played: str) -> Markup:
         on = index not in state.rotary.off
         change = f"{'+' if on else '-'}{index}"
         traced.append(button(f"Trace {name}", "state:set.rotary.off", change, pressed=on))
-    parts = [tag("div", join(traced), class_="ws-actions"), setting(state, "rotary.own_mm")]
+    parts = [actions(*traced), setting(state, "rotary.own_mm")]
     if len(state.positions) > 1:
         parts += [setting(state, f"rotary.held.{axis}") for axis in state.position_spans]
         low, high = state.scene.machine.axes[played].travel
@@ -211,8 +210,7 @@ def _points(state: AppState, played: str) -> Markup:
         positions, hint = ",".join(str(90 * turn) for turn in turns), "While the other axis rotates"
         path = f"state:set.rotary.held.{played}"
         parts.append(button(f"Hold {played} at every 90°", path, positions, hint=hint))
-    summary = tag("summary", "Traced points and positions")
-    return tag("details", summary + join(parts), class_="ws-options")
+    return details("Traced points and positions", *parts)
 
 
 # --- The editor: chain, frames, travels and working volume ----------------------------------------
@@ -264,13 +262,13 @@ class EditorSection(Section):
         box = text_box(name, typed, aria_invalid=str(bool(problem)).lower())
         machine_buttons = (button(*arguments, hint=hint) for *arguments, hint in MACHINE_BUTTONS)
         return join((
-            field("Chain", box, name, hint=CHAIN_HINT),
-            tag("p", problem, class_="ws-problem", role="alert") if problem else EMPTY,
+            html.field("Chain", box, name, hint=CHAIN_HINT),
+            alert(problem) if problem else EMPTY,
             *(_frame(state, tables, frame)
               for frame in ("w", *reversed(chain.workpiece), *chain.tool, "S", "t")),
             _bodies(tables["mesh"]),
-            *(tag("p", note, class_="ws-tiny") for note in state.scene.notes),
-            tag("div", join(machine_buttons), class_="ws-actions"),
+            *(tiny(note) for note in state.scene.notes),
+            actions(*machine_buttons),
         ))  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -318,9 +316,9 @@ def _frame(state: AppState, tables: machine_edits.Tables, name: str) -> Markup:
             hint, pressed = "Gantry: two guides with independent errors", gantry is not None
             guides = button("Two guides", "editor:do", f"gantry {name}", hint=hint, pressed=pressed)
             buttons.insert(-1, guides)
-        lines += [*_guides(state, gantry), tag("div", join(buttons), class_="ws-actions")]
-    summary = fill("<summary><b>{}</b> {}</summary>", name, about)
-    return tag("details", summary + join(lines), class_="ws-frame", data_key=f"frame-{name}")
+        lines += [*_guides(state, gantry), actions(*buttons)]
+    heading = fill("<b>{}</b> {}", name, about)
+    return details(heading, *lines, kind="frame", data_key=f"frame-{name}")
 
 
 def _boxes(
@@ -333,7 +331,7 @@ def _boxes(
         name = f"editor:set.{command} {index}"
         description = f"{label} of {frame}, {letter} in {unit}"
         box = text_box(name, spell_typed(value), label=description, inputmode="decimal")
-        boxes.append(fill('<label for="{}">{}</label>{}', ident(name), letter, box))
+        boxes.append(fill('<label for="{}">{}</label>{}', html.ident(name), letter, box))
     head = fill("<span>{} <small>{}</small></span>", label, unit)
     return tag("div", head + join(boxes), class_="ws-numbers-line")
 
@@ -355,7 +353,7 @@ def _guides(state: AppState, gantry: Gantry | None) -> list[Markup]:
     hint = "Click to change the direction"
     across = button(f"Spaced along {gantry.across}", "editor:do", f"across {name}", kind="link",
                     hint=hint)  # fmt: skip
-    return [*lines, across, tag("p", note, class_="ws-tiny")]
+    return [*lines, across, tiny(note)]
 
 
 def _bodies(bodies: dict[str, BodySource]) -> Markup:
@@ -364,10 +362,8 @@ def _bodies(bodies: dict[str, BodySource]) -> Markup:
         remove = button("Remove", "editor:do", f"mesh {frame}", kind="link",
                         aria_label=f"Remove the body of {frame}")  # fmt: skip
         lines.append(tag("p", join((tag("b", frame), " ", _source(source), " ", remove))))
-    lines = lines or [tag("p", "All bodies are generated automatically.")]
-    summary = tag("summary", "Bodies defined by the scene")
-    return tag("details", join((summary, *lines, tag("p", BODIES, class_="ws-tiny"))),
-               class_="ws-frame", data_key="frame-bodies")  # fmt: skip
+    lines = [*(lines or [tag("p", "All bodies are generated automatically.")]), tiny(BODIES)]
+    return details("Bodies defined by the scene", *lines, kind="frame", data_key="frame-bodies")
 
 
 def _source(source: BodySource) -> str:

@@ -6,13 +6,7 @@ from dataclasses import replace
 
 from markupsafe import Markup
 
-from warpspace.analysis.note_tables import (
-    note_numbers,
-    spell_change,
-    spell_numbers,
-    spell_place,
-    stale_remark,
-)
+from warpspace.analysis import note_tables
 from warpspace.app.browser.html import EMPTY, button, fill, join, linked, tag, text_box
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents.offline_page import step_words
@@ -20,7 +14,7 @@ from warpspace.app.documents.scene_file import reopened, view_of
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import explain_point, pick_worst, with_picked
-from warpspace.app.panels.panel import Context, Panel, Refresh, actions, setting
+from warpspace.app.panels.panel import Context, Panel, Refresh, actions, quiet, setting, tiny
 from warpspace.app.state.app_state import AppState, Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.tree import leaves, set_leaf, stored
@@ -115,9 +109,13 @@ class NotesPanel(Panel):
             note = Note(kind=kind, text=text, author=_author(state), at=at, on=on, view=view,
                         loop=state.loop.value)  # fmt: skip
             if self._before_decision is not None and kind == "decision":
-                before = note_numbers(self._before_decision.resulting_scene(), [note])[0]
+                before = note_tables.note_numbers(self._before_decision.resulting_scene(), [note])[
+                    0
+                ]
                 note = replace(note, before=before, change=_changes(self._before_decision, state))
-            note = replace(note, numbers=note_numbers(state.resulting_scene(), [note])[0])
+            note = replace(
+                note, numbers=note_tables.note_numbers(state.resulting_scene(), [note])[0]
+            )
         return _opened(replace(state, review=with_note(state.review, note)), LIST)
 
     def _place(self, state: AppState) -> tuple[Mapping[str, float], NoteAnchor | None]:
@@ -246,7 +244,7 @@ def _list_html(state: AppState) -> Markup:
         _form(state, "") if edited == NEW else EMPTY,
         *(_form(state, edited) if note.id == edited else _note_html(number, note, steps)
           for number, note in enumerate(state.review, 1)),
-        EMPTY if state.review else tag("p", "No notes yet.", class_="ws-quiet"),
+        EMPTY if state.review else quiet("No notes yet."),
     ))  # fmt: skip
 
 
@@ -267,7 +265,11 @@ def _message_html(message: Note | Reply) -> Markup:
 
 def _note_html(number: int, note: Note, steps: Sequence[Note]) -> Markup:
     facts, texts = (
-        [spell_place(note), spell_numbers(note), spell_change(note)],
+        [
+            note_tables.spell_place(note),
+            note_tables.spell_numbers(note),
+            note_tables.spell_change(note),
+        ],
         [_message_html(note)],
     )
     if note.versions:
@@ -279,7 +281,7 @@ def _note_html(number: int, note: Note, steps: Sequence[Note]) -> Markup:
     place = f" · step {steps.index(note) + 1}" if note.step else ""
     return tag("article", join((
         tag("h3", f"{number} · {note.kind}{place}"), *texts,
-        tag("p", " · ".join(filter(None, facts)), class_="ws-tiny"),
+        tiny(" · ".join(filter(None, facts))),
         tag("p", "", class_="ws-changed", data_piece=f"note.{note.id}"),
         *(tag("blockquote", _message_html(answer)) for answer in note.replies),
         text_box(reply, "", label=f"Reply to note {number}", placeholder="Reply",
@@ -335,7 +337,7 @@ class NoteNumbersPanel(Panel):
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         review, scene = picture.state.review, picture.state.resulting_scene()
-        remarks = [*map(stale_remark, review, note_numbers(scene, review))]
+        remarks = [*map(note_tables.stale_remark, review, note_tables.note_numbers(scene, review))]
         stale = [str(number) for number, remark in enumerate(remarks, 1) if remark]
         self.context.page.call("overlay.show", {"stale": stale})
         return {

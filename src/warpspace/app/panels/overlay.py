@@ -10,15 +10,7 @@ from markupsafe import Markup
 
 from warpspace.app.browser.html import EMPTY, fill, join, menu, tag, text_box
 from warpspace.app.browser.viser_private import queued
-from warpspace.app.documents.legend import (
-    legend_html,
-    numbers_words,
-    order_conditions,
-    part_html,
-    place_words,
-    subject_words,
-    within_limit_words,
-)
+from warpspace.app.documents import legend
 from warpspace.app.drawing.camera import read_room
 from warpspace.app.drawing.labels import Label, axis_labels, note_labels, point_labels
 from warpspace.app.drawing.shapes import SCENE_PER_MM
@@ -42,15 +34,15 @@ class HeadPanel(Panel):
     refresh = Refresh.IMMEDIATE
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        subjects, place = subject_words(picture), place_words(picture)
+        subjects, place = legend.subject_words(picture), legend.place_words(picture)
         head = fill(
             '<div data-piece="reopened"></div><h1>{numbers}</h1>'
             '<div>{place}<span data-piece="head.kept"></span>'
             '<span data-piece="head.allowed"></span></div>{words}'
             '<div data-piece="head.order"></div>',
-            numbers=numbers_words(picture), place=place,
+            numbers=legend.numbers_words(picture), place=place,
             words=(tag("p", " · ".join(subjects), class_="ws-subject") if subjects else EMPTY)
-            + part_html(picture),
+            + legend.part_html(picture),
         )  # fmt: skip
         return {"head": head}
 
@@ -68,7 +60,7 @@ class LegendPanel(Panel):
         limit_menu = EMPTY
         if not picture.is_difference:
             (share, is_pass), limit = (
-                within_limit_words(picture),
+                legend.within_limit_words(picture),
                 picture.state.specification.limit_um,
             )
             box = text_box("state:set.specification.limit_um", f"{limit:g}", size="short",
@@ -76,8 +68,8 @@ class LegendPanel(Panel):
             body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
             limit_menu = menu(share, body, key="limit", hint="Change the limit",
                         kind="ws-pass" if is_pass else "ws-fail")  # fmt: skip
-            limit_menu = Markup(" · ") + limit_menu if place_words(picture) else limit_menu
-        return {"head.kept": limit_menu, "legend": legend_html(picture)}
+            limit_menu = Markup(" · ") + limit_menu if legend.place_words(picture) else limit_menu
+        return {"head.kept": limit_menu, "legend": legend.legend_html(picture)}
 
 
 class OrderPanel(Panel):
@@ -90,7 +82,7 @@ class OrderPanel(Panel):
     refresh = Refresh.IDLE
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        conditions, scene = [*order_conditions(picture)], picture.state.left_behind
+        conditions, scene = [*legend.order_conditions(picture)], picture.state.left_behind
         if scene:
             conditions.append(f"with the errors of this machine; those of “{scene}” are not used")
         allowed = "" if picture.is_difference else allowed_words(picture.drawn_state)

@@ -7,6 +7,7 @@ from markupsafe import Markup
 from warpspace.analysis.registry import entries
 from warpspace.app.browser.html import join, tag
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.panels import machine_editor
 from warpspace.app.panels.analysis_panel import AnalysisPanel
 from warpspace.app.panels.conventions import ConventionsSection
 from warpspace.app.panels.design import ConceptsPanel, TolerancesPanel
@@ -15,16 +16,10 @@ from warpspace.app.panels.explanation import DistancePanel, VolumePanel, WorstPa
 from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog
 from warpspace.app.panels.import_panel import ImportPanel
 from warpspace.app.panels.improve import AdjustPanel, BestPanel, CompensatePanel
-from warpspace.app.panels.machine_editor import (
-    EditorSection,
-    MachinesDialog,
-    PositionsSection,
-    RotarySection,
-)
 from warpspace.app.panels.measurement import CalibratePanel, TestsPanel
 from warpspace.app.panels.note_panels import NoteNumbersPanel, NotesPanel, StoryPanel
 from warpspace.app.panels.overlay import HeadPanel, LegendPanel, OrderPanel, OverlayPanel
-from warpspace.app.panels.panel import Context, Panel, Section
+from warpspace.app.panels.panel import Context, Panel, Section, details
 from warpspace.app.panels.part_panels import PartPanel, ProgramPanel
 from warpspace.app.panels.toolbar import ComparePanel, ControlsPanel
 from warpspace.app.panels.top_bar import HelpDialog, PagePanel, ScenesDialog, StatePanel, TopPanel
@@ -73,8 +68,7 @@ class TasksPanel(Panel):
         places = _places(name for name in names if name not in RARE)
         rare = _places(name for name in names if name in RARE)
         if rare:
-            places += tag("details", tag("summary", "More analyses") + rare, class_="ws-more",
-                          data_key=f"more.{task}")  # fmt: skip
+            places += details("More analyses", rare, kind="more", data_key=f"more.{task}")
         return {
             "tasks": tag("h2", "Tasks", class_="ws-heard")
             + tag("div", tabs, role="tablist", aria_label="Tasks", class_="ws-tabs")
@@ -89,7 +83,12 @@ def _places(names: Iterable[str]) -> Markup:
 
 def build_panels(context: Context) -> list[Panel]:
     of_tasks = (WorstPanel, VolumePanel, ImportPanel, TestsPanel)
-    of_machine = (PositionsSection, ConventionsSection, RotarySection, EditorSection)
+    of_machine = (
+        machine_editor.PositionsSection,
+        ConventionsSection,
+        machine_editor.RotarySection,
+        machine_editor.EditorSection,
+    )
     sections: list[Section] = [
         *(kind(context) for kind in of_tasks),
         *(PANELS.get(entry.name, AnalysisPanel)(context, entry) for entry in entries()),
@@ -98,7 +97,7 @@ def build_panels(context: Context) -> list[Panel]:
     kinds = (
         TopPanel, HeadPanel, LegendPanel, OrderPanel, ControlsPanel, ComparePanel, ErrorsPanel,
         OverlayPanel, StatePanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
-        MachinesDialog, FilesDialog, ReportDialog, HelpDialog, StoryPanel,
+        machine_editor.MachinesDialog, FilesDialog, ReportDialog, HelpDialog, StoryPanel,
     )  # fmt: skip
     panels = [kind(context) for kind in kinds]
     return [*panels, TasksPanel(context, sections), *sections, BestPanel(context)]

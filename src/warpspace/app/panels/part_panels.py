@@ -20,7 +20,7 @@ from warpspace.app.evaluation.scene_overlays import AT_LINE, moved_place, part_o
 from warpspace.app.panels.analysis_panel import ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.measurement import MOST_BYTES, FilesPanel, UploadedFile
-from warpspace.app.panels.panel import actions, setting
+from warpspace.app.panels.panel import actions, quiet, setting
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
 from warpspace.app.state.form_values import option_values
@@ -63,7 +63,7 @@ class SceneOverlayPanel(FilesPanel):
         missing = (
             f"{name} is not loaded: links and saved scenes store only its name. Open it again."
         )
-        about = tag("p", missing, class_="ws-quiet") if name else EMPTY
+        about = quiet(missing) if name else EMPTY
         if content:
             remove = button("✕", f"{self.name}:remove", kind="link", aria_label=f"Remove {name}")
             about = tag("p", join((tag("b", name), " ", remove))) + self.about(state)

@@ -6,26 +6,12 @@ from dataclasses import replace
 from markupsafe import Markup
 
 from warpspace.analysis.uncertainty.propagation import NOT_STATED
-from warpspace.app.browser.html import (
-    EMPTY,
-    button,
-    choice,
-    field,
-    fill,
-    join,
-    lowered,
-    menu,
-    number,
-    rows,
-    signed,
-    switch,
-    tag,
-    text_box,
-)
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, field, join, number, tag, text_box
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.panels.conventions import with_travel
-from warpspace.app.panels.panel import Panel, Refresh, setting
+from warpspace.app.panels.panel import Panel, Refresh, setting, tiny
 from warpspace.app.state.app_state import COMPARISON_VIEWS, COMPONENT_NAMES, NOBODY, AppState, Side
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import QUANTITIES, SURFACES, slice_positions
@@ -65,18 +51,18 @@ class ControlsPanel(Panel):
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         camera = self.context.camera
-        lens = switch("controls:set.lens", "Orthographic", on=camera.orthographic,
+        lens = html.switch("controls:set.lens", "Orthographic", on=camera.orthographic,
                       hint="Parallel projection")  # fmt: skip
-        triad = fill(
+        triad = html.fill(
             '<svg data-piece="triad.axes" viewBox="-46 -46 92 92" aria-hidden="true"></svg>'
         )
         menus = (_exaggeration(picture), _colours(picture), _surface(picture),
                  _machine(picture.state))  # fmt: skip
         return {
             "controls": join(menus),
-            "triad": menu(triad, _picks("controls:view", VIEWS, camera.view) + lens, key="view",
-                          label="View from", kind="up",
-                          hint="Machine axes; click to select a view direction"),
+            "triad": html.menu(triad, _picks("controls:view", VIEWS, camera.view) + lens,
+                               key="view", label="View from", kind="up",
+                               hint="Machine axes; click to select a view direction"),
         }  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -109,7 +95,7 @@ def _exaggeration(picture: LivePicture) -> Markup:
     name = "state:set.exaggeration"
     box = text_box(name, f"{picture.exaggeration:.4g}", size="short")
     body = field("Exaggeration ×", box, name) + _picks(name, factors, chosen)
-    return menu(label, body, key="exaggeration", label=f"Exaggeration: {label}", kind="up",
+    return html.menu(label, body, key="exaggeration", label=f"Exaggeration: {label}", kind="up",
                 hint="Display factor of the errors, 0.001 to 1 000 000")  # fmt: skip
 
 
@@ -120,11 +106,11 @@ def _colours(picture: LivePicture) -> Markup:
     body: list[Markup] = []
     label: object = limit
     for quantity, title in QUANTITIES.items():
-        names = {key: lowered(text) for key, text in COMPONENT_NAMES[quantity].items()}
+        names = {key: html.lowered(text) for key, text in COMPONENT_NAMES[quantity].items()}
         if quantity == "uncertainty" and (uncertainty is None or not uncertainty.errors.is_known):
             text = NOT_STATED if uncertainty is None else "; ".join(uncertainty.errors.remarks())
             if not picture.is_difference:
-                body += [tag("h3", title), tag("p", text, class_="ws-tiny")]
+                body += [tag("h3", title), tiny(text)]
             continue
         body += [tag("h3", title), _picks("controls:map", names, chosen, f"{quantity}.")]
         if quantity == picture.quantity and chosen != "limit":
@@ -133,7 +119,7 @@ def _colours(picture: LivePicture) -> Markup:
     top = look.range_top if look.range_mode == "fixed" else picture.scale.high
     body += [tag("h3", "Colour range"), _leaf_picks(state, "look.range_mode"),
              setting(state, "look.range_top", text=f"{top:.4g}")]  # fmt: skip
-    return menu(label, join(body), key="map", kind="up", hint="Quantity shown by the colours")
+    return html.menu(label, join(body), key="map", kind="up", hint="Quantity shown by the colours")
 
 
 def _surface(picture: LivePicture) -> Markup:
@@ -151,9 +137,11 @@ def _surface(picture: LivePicture) -> Markup:
     direction, name = state.scene.model.direction, "controls:set.travel"
     if state.scene.errors.has_directions or direction != TravelDirection.MEAN:
         directions = {str(travel): label for travel, label in DIRECTION_WORDS.items()}
-        body.append(field("Direction of travel", choice(name, str(direction), directions), name))
+        body.append(
+            field("Direction of travel", html.choice(name, str(direction), directions), name)
+        )
     body.append(setting(state, "nodes"))
-    return menu(SURFACES[state.look.surface], join(body), key="surface", kind="up",
+    return html.menu(SURFACES[state.look.surface], join(body), key="surface", kind="up",
                 hint="Display of the volume")  # fmt: skip
 
 
@@ -162,7 +150,7 @@ def _machine(state: AppState) -> Markup:
     chosen = "solid" if look.shown else "ghost" if look.ghost else "off"
     body = _picks("controls:machine", MACHINES, chosen)
     body += setting(state, "machine.bent") if look.shown else EMPTY
-    return menu(f"machine: {chosen}", body, key="machine", kind="up",
+    return html.menu(f"machine: {chosen}", body, key="machine", kind="up",
                 hint="Display of the machine")  # fmt: skip
 
 
@@ -185,7 +173,7 @@ class ComparePanel(Panel):
         titles = {title: title for title in (*_own_sides(state), *self.context.scenes)}
         b = NOBODY if comparison.b is None else comparison.b.title
         body = [
-            field(title, choice(name, side, label), name)
+            field(title, html.choice(name, side, label), name)
             for title, name, side, label in (
                 ("A", "compare:set.a", comparison.a.title, titles),
                 ("B", "compare:set.b", b, {NOBODY: NOBODY, **titles}),
@@ -197,7 +185,7 @@ class ComparePanel(Panel):
             body += [setting(state, "comparison.ghost"), comparison_html(compared)]
         label = "compare" if compared is None else COMPARISON_VIEWS[compared.view]
         return {"compared": "" if compared is None else _sides(compared),
-                "compare": menu(label, join(body), key="compare", kind="up wide",
+                "compare": html.menu(label, join(body), key="compare", kind="up wide",
                                 hint="Compare two scenes, or errors before and after")}  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -244,14 +232,14 @@ def comparison_html(compared: Compared) -> Markup:
     for label, name in ROWS.items():
         a, b = getattr(compared.a, name), getattr(compared.b, name)
         node_by_node = "" if change is None else number(getattr(change, name), 2)
-        cells = (number(a, 2), number(b, 2), signed(b - a, 2), node_by_node)
+        cells = (number(a, 2), number(b, 2), html.signed(b - a, 2), node_by_node)
         lines.append(tag("tr", tag("th", label) + join(
             tag("td", cell, data_compared=f"{label} {side}")
             for side, cell in zip(("A", "B", "change", "B − A"), cells, strict=True)
         )))  # fmt: skip
     head = join(tag("th", label) for label in (
-        "µm", "A", "B", "change", lowered("|E_B − E_A|")))  # fmt: skip
-    titles = rows(zip("AB", compared.titles, strict=True), kind="ws-titles")
+        "µm", "A", "B", "change", html.lowered("|E_B − E_A|")))  # fmt: skip
+    titles = html.rows(zip("AB", compared.titles, strict=True), kind="ws-titles")
     note = compared.refused or "change: B − A of each statistic. |E_B − E_A|: at each node."
     table = tag("table", tag("tr", head) + join(lines), class_="ws-numbers")
-    return titles + table + tag("p", lowered(note), class_="ws-tiny")
+    return titles + table + tiny(html.lowered(note))

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from warpspace.app.browser.html import EMPTY, button, join, rows, tag, text_box, upload_button
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.file_dialogs import accepted_endings
-from warpspace.app.panels.panel import Context, Dialog, Panel, Refresh
+from warpspace.app.panels.panel import Context, Dialog, Panel, Refresh, quiet
 from warpspace.app.state.app_state import AppState, Exclusions
 from warpspace.app.state.tree import put, toggled
 from warpspace.exceptions import OptionError
@@ -87,8 +87,7 @@ class ScenesDialog(Dialog):
                 aria_current="true" if scene is picture.state.origin else None)
             for title, scene in self.context.scenes.items()
         )  # fmt: skip
-        hint = tag("p", "To open a file, use Open in the top bar, or drop it on the page.",
-                   class_="ws-quiet")  # fmt: skip
+        hint = quiet("To open a file, use Open in the top bar, or drop it on the page.")
         return tag("div", join(scenes), class_="ws-list", data_list=True) + hint
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -200,8 +199,8 @@ class HelpDialog(Dialog):
             tag("div", box + tag("div", commands, class_="ws-list ws-columns"), data_list=True),
             tag("h3", "Mouse and keyboard"), rows(FIRST_HELP, "ws-keys"),
             tag("h3", "Legend"), rows(MEANINGS, "ws-keys"),
-            tag("p", "Keys are active except while text is entered. After an interruption of the"
-                " connection, the state of a tab is available for ten minutes.", class_="ws-quiet"),
+            quiet("Keys are active except while text is entered. After an interruption of the"
+                " connection, the state of a tab is available for ten minutes."),
             *((tag("h3", scene.title), tag("p", about)) if about else ()),
         ))  # fmt: skip
 
