@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from markupsafe import Markup
 
@@ -70,6 +70,12 @@ class AnalysisPanel(Section):
 
     runs_on_open = False
     run_label, run_hint = "Run", ""
+    unsupported: tuple[str, ...] = ()  # options that the page does not offer
+    outcome: AnalysisOutcome | None = None
+    problem: tuple[ResultKey, str] | None = None
+    last_key: ResultKey = ()  # of the last run
+    _applied_key: ResultKey = ()  # of the state after a proposed change was applied
+    _title_prefix = ""
 
     def __init__(self, context: Context, entry: Entry) -> None:
         super().__init__(context)
@@ -78,12 +84,7 @@ class AnalysisPanel(Section):
         sentence = entry.sentence.replace(" of SCENE", "").replace("SCENE", "the machine")
         self.sentence = self.sentence or sentence.rstrip(".")
         self.runs_on_open = self.runs_on_open or entry.task == "understand"
-        self.outcome: AnalysisOutcome | None = None
-        self._applied_key: ResultKey = ()  # of the state after a proposed change was applied
-        self.problem: tuple[ResultKey, str] | None = None
         self._jobs = Jobs(self, self.rerender, self._fail)
-        self.last_key: ResultKey = ()  # of the last run
-        self._title_prefix = ""
 
     @property
     def kind(self) -> type[Analysis]:
@@ -94,7 +95,8 @@ class AnalysisPanel(Section):
 
     def options(self) -> Sequence[Option]:
         """List the options that the page supports."""
-        return [o for o in self.kind.options() if not (o.grammar and o.grammar.is_file)]
+        options = [o for o in self.kind.options() if o.name not in self.unsupported]
+        return [o for o in options if not (o.grammar and o.grammar.is_file)]
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
         """List the options that apply to the state."""
@@ -127,8 +129,13 @@ class AnalysisPanel(Section):
         """Check if it runs by itself after each change."""
         return self.outcome.took_s < QUICK_S if self.outcome else self.runs_on_open
 
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        """Return fields of the analysis that are no options of the page."""
+        return {}
+
     def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
-        return read_form(self.kind, self.shown_options(state), values, scene)
+        analysis: Any = read_form(self.kind, self.shown_options(state), values, scene)
+        return replace(analysis, **self.inputs(state))
 
     def before_result(self, state: AppState) -> Markup:
         return EMPTY
@@ -176,8 +183,7 @@ class AnalysisPanel(Section):
         if outcome is not None and not problem:
             if key == self._applied_key:
                 text = "Applied to the displayed machine. Undo reverts it."
-                parts.append(tag("p", text, role="status"))
-                parts.append(RECORD)
+                parts += [tag("p", text, role="status"), RECORD]
             elif stale and not is_automatic:
                 text = "Out of date: inputs have changed. Run again."
                 parts.append(tag("p", text, class_="ws-stale"))
@@ -197,9 +203,8 @@ class AnalysisPanel(Section):
         return join((*parts, self.options_html(state)))
 
     def problem_html(self, state: AppState) -> Markup:
-        if self.problem is None or self.problem[0] != self.result_key(state):
-            return EMPTY
-        return alert(self.problem[1])
+        key, text = self.problem or ((), "")
+        return alert(text) if key == self.result_key(state) else EMPTY
 
     def cards_html(self, key: ResultKey) -> Markup:
         outcome, cards = self.outcome, list[Markup]()
@@ -208,14 +213,13 @@ class AnalysisPanel(Section):
         hints = {"Preview": "Compare the result with the current state",
                  "Apply": "Change the errors; the current state becomes A"}  # fmt: skip
         for index in self.offered_changes(outcome.result):
-            buttons = join(
+            buttons = (
                 button(label, f"{self.name}:{label.lower()}", index, hint=hint,
-                       kind="main" if label == "Apply" else "",
-                       disabled=outcome.key != key)
+                       kind="main" if label == "Apply" else "", disabled=outcome.key != key)
                 for label, hint in hints.items()
             )  # fmt: skip
-            row = actions(buttons)
-            cards.append(tag("div", outcome.cards[index][1] + row, class_="ws-card"))
+            card = outcome.cards[index][1] + actions(*buttons)
+            cards.append(tag("div", card, class_="ws-card"))
         return join(cards)
 
     def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:

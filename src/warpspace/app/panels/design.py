@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.blocks import Histogram
-from warpspace.analysis.description import Analysis, Result
+from warpspace.analysis.description import Result
 from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.options import Option, read_numbers
 from warpspace.analysis.sampling.cases import Case, Reduction, SamplingPlan
@@ -79,18 +79,18 @@ class TolerancesPanel(AnalysisPanel):
     def is_automatic(self, state: AppState) -> bool:
         return False  # it would change tolerances by itself
 
-    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
         """Allocate for the limit of the state; fixed keys of another machine are ignored."""
-        analysis: Any = super().build_analysis(state, values, scene)
         specification, keys = state.specification, state.amplitudes.keys()
         fixed = specification.fixed & keys
         costs_by_key = read_numbers(specification.costs, "", "") if specification.costs else {}
         costs = tuple((k, cost) for k, cost in costs_by_key.items() if k in keys and k not in fixed)
-        return replace(
-            analysis, limit_um=specification.limit_um, probability=specification.percent / 100.0,
-            loop=state.loop, over=specification.over, distribution=specification.distribution,
-            costs=costs, fixed=tuple(sorted(fixed)), samples=SAMPLES, workers=1,
-        )  # fmt: skip
+        return {
+            "limit_um": specification.limit_um, "probability": specification.percent / 100.0,
+            "loop": state.loop, "over": specification.over,
+            "distribution": specification.distribution, "costs": costs,
+            "fixed": tuple(sorted(fixed)), "samples": SAMPLES, "workers": 1,
+        }  # fmt: skip
 
     def _accept_outcome(self, outcome: AnalysisOutcome) -> None:
         super()._accept_outcome(outcome)
@@ -259,6 +259,7 @@ class ConceptsPanel(AnalysisPanel):
     """Machines side by side: chosen by title, compared as soon as there are two."""
 
     runs_on_open = True
+    unsupported = ("workers",)
 
     def offers(self, state: AppState) -> dict[str, Scene]:
         """Return the machines that can be compared, by title."""
@@ -274,9 +275,6 @@ class ConceptsPanel(AnalysisPanel):
         text = state.forms.get(f"{self.name}.machines", PRESENT)
         return [key for key in text.split("\n") if key][:MOST_CONCEPTS]
 
-    def options(self) -> Sequence[Option]:
-        return [option for option in super().options() if option.name != "workers"]
-
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {"limit_um": f"{state.specification.limit_um:g}", "samples": str(SAMPLES)}
 
@@ -287,9 +285,8 @@ class ConceptsPanel(AnalysisPanel):
     def is_ready(self, state: AppState) -> bool:
         return len(self.scenes(state)) > 1  # links may name unknown machines
 
-    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
-        analysis: Any = super().build_analysis(state, values, scene)
-        return replace(analysis, workers=1)  # leaves threads to the sliders
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        return {"workers": 1}  # leaves threads to the sliders
 
     def result_key(self, state: AppState) -> ResultKey:
         return (

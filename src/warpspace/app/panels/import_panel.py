@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from markupsafe import Markup
@@ -188,9 +188,8 @@ class ImportPanel(FilesPanel):
             options["variant"] = replace(options["variant"], choices=kind.variants)
         return list(options.values())
 
-    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
-        analysis = read_form(Import, self._options(state, self.files), values, scene)
-        return replace(analysis, sources=tuple(file.content for file in self.files))
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        return {"sources": tuple(file.content for file in self.files)}
 
     def is_automatic(self, state: AppState) -> bool:
         return True

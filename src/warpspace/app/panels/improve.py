@@ -37,7 +37,7 @@ NO_GAIN_UM = 0.005  # smaller improvements are not offered
 class AdjustIncluded(Adjust):
     """An adjustment of errors that are not excluded."""
 
-    keys: tuple[str, ...]
+    keys: tuple[str, ...] = ()
 
     def included(self, scene: Scene) -> Sequence[str]:
         return [key for key in scene.parameter_keys if key in self.keys]
@@ -48,6 +48,10 @@ class AdjustPanel(AnalysisPanel):
 
     runs_on_open = True
 
+    @property
+    def kind(self) -> type[Analysis]:
+        return AdjustIncluded
+
     def options(self) -> Sequence[Option]:
         changes = {"default": None, "choices": ("all",), "choice_labels": {"all": "any error"}}
         return [replace(o, **changes) if o.name == "adjustable" else o for o in super().options()]
@@ -55,10 +59,8 @@ class AdjustPanel(AnalysisPanel):
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), "objective": Objective.MAX}
 
-    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
-        analysis = super().build_analysis(state, values, scene)
-        keys = tuple(key for key in state.amplitudes if state.exclusions.active(key))
-        return AdjustIncluded(**vars(analysis), keys=keys)
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        return {"keys": tuple(filter(state.exclusions.active, state.amplitudes))}
 
     def result_key(self, state: AppState) -> ResultKey:
         return (*super().result_key(state), state.exclusions)  # even if an excluded one is zero

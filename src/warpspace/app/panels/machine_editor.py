@@ -24,10 +24,10 @@ from warpspace.app.evaluation.machine_bodies import (
 )
 from warpspace.app.panels.block_html import block_html
 from warpspace.app.panels.panel import (
-    Context,
     Dialog,
     Section,
     actions,
+    alert,
     details,
     quiet,
     setting,
@@ -251,9 +251,7 @@ class EditorSection(Section):
     name, task, title = "editor", "machine", "Edit the machine"
     sentence = "Axes, their order, offsets and travels; or another machine to start from"
 
-    def __init__(self, context: Context) -> None:
-        super().__init__(context)
-        self._refused = ("", "")  # rejected chain and error message
+    _refused = ("", "")  # rejected chain and error message
 
     def body(self, picture: LivePicture) -> Markup:
         state, name = picture.state, "editor:set.chain"

@@ -10,7 +10,6 @@ from markupsafe import Markup
 
 from warpspace.analysis.blocks import Lines, Table
 from warpspace.analysis.description import Analysis, ProgressCallback, Result
-from warpspace.analysis.options import Option
 from warpspace.analysis.registry import Entry
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, choice, join, number, tag
@@ -27,7 +26,7 @@ from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.panel import Context, Job, Jobs, actions, alert, details, quiet, tiny
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.form_values import TEST, read_form, with_form
+from warpspace.app.state.form_values import TEST, with_form
 from warpspace.bench.base import BenchResult, BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table as parse_test
 from warpspace.calibration.calibrate import Calibrate
@@ -255,20 +254,19 @@ def read_uploaded(
 class CalibratePanel(FilesPanel):
     """Uploaded readings, fitted errors, and residuals as arrows in the drawing."""
 
-    def __init__(self, context: Context, entry: Entry) -> None:
-        super().__init__(context, entry)
-        self._next_kind, self._arrows = "", ""
-        self._drawn: Nodes | None = None
+    unsupported = ("kinds",)  # set per file
+    _next_kind, _arrows = "", ""
+    _drawn: Nodes | None = None
 
-    def options(self) -> Sequence[Option]:
-        return [option for option in super().options() if option.name != "kinds"]  # set per file
+    @property
+    def kind(self) -> type[Analysis]:
+        return CalibrateTexts
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), "next_count": "3"}
 
-    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
-        analysis = read_form(CalibrateTexts, self.options(), values, scene)
-        return replace(analysis, files=self.files)
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        return {"files": self.files}
 
     def before_result(self, state: AppState) -> Markup:
         introduction = "Errors of this machine are fitted to readings in CSV files."

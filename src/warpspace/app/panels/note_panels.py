@@ -41,12 +41,9 @@ class NotesPanel(Panel):
     """The list of notes, in place of the tasks."""
 
     name = "notes"
-
-    def __init__(self, context: Context) -> None:
-        super().__init__(context)
-        self._before_decision: AppState | None = None  # of the decision that is being written
-        # the restored view of a note: title, id of the note, state and camera before it
-        self._restored: tuple[str, str, AppState, CameraMemory] | None = None
+    _before_decision: AppState | None = None  # of the decision that is being written
+    # the restored view of a note: title, id of the note, state and camera before it
+    _restored: tuple[str, str, AppState, CameraMemory] | None = None
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         state, bar = picture.state, EMPTY

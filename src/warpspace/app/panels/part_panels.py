@@ -1,6 +1,6 @@
 """The workpiece in the working volume: placement and inspection; and the NC program."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -9,8 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.blocks import Table
-from warpspace.analysis.description import Analysis, Result
-from warpspace.analysis.options import Option
+from warpspace.analysis.description import Result
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, join, tag
 from warpspace.app.browser.incoming import index_of
@@ -27,7 +26,6 @@ from warpspace.app.state.form_values import option_values
 from warpspace.kinematics import transforms
 from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
 from warpspace.parts.workpiece import load_workpiece, place_workpiece
-from warpspace.scene.model import Scene
 
 MOST_LETTERS = 200  # of a displayed line
 
@@ -97,18 +95,15 @@ class PartPanel(SceneOverlayPanel):
     """A workpiece: its placement, and an inspection of it as machined."""
 
     part_fields = ("mesh", "name")
+    unsupported = ("place", "predistorted")
     _sent: tuple[str, bytes] | None = None  # read again with another unit
 
-    def options(self) -> Sequence[Option]:
-        return [o for o in super().options() if o.name not in ("place", "predistorted")]
-
-    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
-        analysis: Any = super().build_analysis(state, values, scene)
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
         (scene_part, _), part = PartLook.of_scene(state.scene), state.part
         features = state.scene.part.path("features") if part.mesh is scene_part.mesh else None
         tolerances = next(((file.name, file.content) for file in self.files), None)
         files = {"features": features, "tolerances": tolerances}
-        return replace(analysis, place=part.place, mesh=part.mesh, **files)
+        return {"place": part.place, "mesh": part.mesh, **files}
 
     def about(self, state: AppState) -> Markup:
         turns = (button(f"{axis} 90°", f"{self.name}:turn", axis, kind="choice",
@@ -155,9 +150,8 @@ class ProgramPanel(SceneOverlayPanel):
     most_bytes = MOST_BYTES  # longer programs would delay other tabs
     part_fields = ("program", "program_name")
 
-    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
-        analysis: Any = super().build_analysis(state, values, scene)
-        return replace(analysis, file=state.part.program_name, text=state.part.program)
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        return {"file": state.part.program_name, "text": state.part.program}
 
     def about(self, state: AppState) -> Markup:
         line, text = state.forms.get(AT_LINE, ""), (state.part.program or "").splitlines()
