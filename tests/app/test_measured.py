@@ -13,7 +13,6 @@ from warpspace.analysis.registry import entries
 from warpspace.app.documents.scene_file import settings_line, with_settings
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.live_model import LiveModel
-from warpspace.app.panels.import_panel import ImportPanel
 from warpspace.app.panels.measurement import (
     MOST_FILES,
     CalibratePanel,
@@ -22,6 +21,7 @@ from warpspace.app.panels.measurement import (
     arrows_of,
     read_uploaded,
 )
+from warpspace.app.panels.upload_panels import ImportPanel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put

@@ -10,7 +10,7 @@ from warpspace.app.documents.output_services import Services
 from warpspace.app.documents.scene_file import SceneList, open_link
 from warpspace.app.documents.transfers import unpack
 from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog
-from warpspace.app.panels.top_bar import (
+from warpspace.app.panels.page_panels import (
     COMMANDS,
     HelpDialog,
     PagePanel,

@@ -7,7 +7,7 @@ import pytest
 
 from app.hostile import upload
 from app.wire import opened
-from warpspace.app.panels import part_panels
+from warpspace.app.panels import upload_panels
 from warpspace.exceptions import OptionError
 from warpspace.parts.workpiece import Workpiece
 from warpspace.resources import scenes_dir
@@ -19,7 +19,7 @@ STL = (scenes_dir() / "parts" / "contour.stl").read_bytes()
 @pytest.fixture
 def held(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[threading.Event, list[str]]]:
     """Have a mesh parsed once an event is set; give that, and the names of the files so far."""
-    go_on, begun, original = threading.Event(), list[str](), part_panels.load_workpiece
+    go_on, begun, original = threading.Event(), list[str](), upload_panels.load_workpiece
 
     def load(name: str, unit: str | None, content: bytes) -> Workpiece:
         begun.append(name)
@@ -28,7 +28,7 @@ def held(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[threading.Event, lis
             raise OptionError("bad.stl: expected triangles")
         return original(name, unit, content)
 
-    monkeypatch.setattr(part_panels, "load_workpiece", load)
+    monkeypatch.setattr(upload_panels, "load_workpiece", load)
     yield go_on, begun
     go_on.set()
 

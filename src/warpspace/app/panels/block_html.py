@@ -20,6 +20,7 @@ WIDEST = 5  # columns of a table that fit into the column of the page
 MOST_BARS = 10
 WIDE, HIGH = 320.0, 190.0  # of a chart, in its own units
 MARGIN_LEFT, RIGHT, TOP, BOTTOM = 40.0, 8.0, 8.0, 30.0
+INNER = WIDE - MARGIN_LEFT - RIGHT, HIGH - TOP - BOTTOM
 SERIES = 6  # colours of series in the style sheet
 ANGLES = Markup(
     '<path class="ws-faint" d="M-1 0H1M0 -1V1"/><text x="1.02" y=".05">0°</text>'
@@ -104,15 +105,13 @@ class PlotFrame:
 
     def place(self, x: Array | float, y: Array | float) -> Array:
         """Compute points of the drawing, [..., 2]."""
-        across = MARGIN_LEFT + (WIDE - MARGIN_LEFT - RIGHT) * (x - self.x[0]) / (
-            self.x[1] - self.x[0]
-        )
-        down = TOP + (HIGH - TOP - BOTTOM) * (self.y[1] - y) / (self.y[1] - self.y[0])
+        across = MARGIN_LEFT + INNER[0] * (x - self.x[0]) / (self.x[1] - self.x[0])
+        down = TOP + INNER[1] * (self.y[1] - y) / (self.y[1] - self.y[0])
         return np.stack(np.broadcast_arrays(across, down), axis=-1)
 
     def to_scale(self) -> "PlotFrame":
         """Widen one of the axes until a unit is as long on both."""
-        rooms = (self.x, WIDE - MARGIN_LEFT - RIGHT), (self.y, HIGH - TOP - BOTTOM)
+        rooms = (self.x, INNER[0]), (self.y, INNER[1])
         per = max((high - low) / room for (low, high), room in rooms) / 2.0
         x, y = (
             ((low + high) / 2.0 - per * room, (low + high) / 2.0 + per * room)

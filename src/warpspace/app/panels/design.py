@@ -328,10 +328,8 @@ class ConceptsPanel(AnalysisPanel):
         elif action == "remove" and value in chosen:
             chosen.remove(value)
         elif action == "open" and value in offers and value != PRESENT:
-            opened = start_state(offers[value])
-            self.context.call_soon(
-                partial(self.context.show_opened, opened, None, keeps_comparison=True)
-            )
+            show = partial(self.context.show_opened, keeps_comparison=True)
+            self.context.call_soon(partial(show, start_state(offers[value]), None))
             return state
         elif action == "sheet":
             self._draw(state)

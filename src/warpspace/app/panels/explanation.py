@@ -12,16 +12,14 @@ from warpspace.analysis.uncertainty.propagation import NAMES
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, join, number, rows, signed, tag
 from warpspace.app.drawing.camera import fit_camera
+from warpspace.app.evaluation import point_explanation
 from warpspace.app.evaluation.compare import without_words
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import (
     POINTS,
     PointExplanation,
-    awaited_form,
     explain_point,
-    measure_distance,
     pick_worst,
-    with_picked,
 )
 from warpspace.app.panels.analysis_panel import AnalysisPanel
 from warpspace.app.panels.block_html import block_html
@@ -30,13 +28,8 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.tree import EXAMPLE, put
 from warpspace.field.evaluate import placed_words
 from warpspace.machine.axes import parameter
-from warpspace.picture.formatting import (
-    LOOP_WORDS,
-    length_words,
-    spell_axes,
-    spell_in_r,
-    u95_behind,
-)
+from warpspace.picture import formatting
+from warpspace.picture.formatting import length_words
 from warpspace.scene.model import evaluate_grid
 from warpspace.units import spell_count
 
@@ -83,21 +76,19 @@ class WorstPanel(Section):
     def _explain(self, picture: LivePicture) -> PointExplanation:
         if self._explanation is None or self._explanation[0] is not picture:
             picked = picture.state.picked or pick_worst(picture)
-            self._explanation = (
-                picture,
-                explain_point(picture.drawn_state, picked, picture.exaggeration),
-            )
+            explanation = explain_point(picture.drawn_state, picked, picture.exaggeration)
+            self._explanation = picture, explanation
         return self._explanation[1]
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action == "set.at":
             return put(state, "picked", value)
         if action == "forget":
-            return with_picked(state, None)
+            return point_explanation.with_picked(state, None)
         if action == "lever" and value in state.amplitudes:
             picture = self.context.picture
             if state.picked is None and picture is not None:
-                state = with_picked(state, pick_worst(picture))
+                state = point_explanation.with_picked(state, pick_worst(picture))
             return replace(state, lever="" if value == state.lever else value)
         if action == "back":
             self.context.call_soon(self._show_lever)
@@ -119,7 +110,7 @@ class WorstPanel(Section):
 
 
 def _axes(explanation: PointExplanation) -> str:
-    return spell_axes(explanation.at).removeprefix("axes ")
+    return formatting.spell_axes(explanation.at).removeprefix("axes ")
 
 
 def _contributions(explanation: PointExplanation) -> Markup:
@@ -180,9 +171,9 @@ def _details(explanation: PointExplanation, lever: str) -> Markup:
     copied = "\n".join(
         "\t".join((c.key, f"{c.along_um:.3f}", *(f"{v:.3f}" for v in c.error_um))) for c in ranked
     )
-    place = spell_in_r(point.nominal_mm + explanation.shift_mm)
+    place = formatting.spell_in_r(point.nominal_mm + explanation.shift_mm)
     tilt = number(float(np.linalg.norm(point.orientation_urad)))
-    loop = LOOP_WORDS[explanation.loop]
+    loop = formatting.LOOP_WORDS[explanation.loop]
     box = html.text_box("worst:set.at", _axes(explanation), placeholder=EXAMPLE)
     return tag("div", join((
         html.field("Point", box, "worst:set.at",
@@ -213,10 +204,8 @@ class DistancePanel(AnalysisPanel):
         return (*super().body_dependencies(picture), id(picture))
 
     def before_result(self, state: AppState) -> Markup:
-        point, drawn = (
-            awaited_form(state),
-            self.context.picture and measure_distance(self.context.picture),
-        )
+        point, picture = point_explanation.awaited_form(state), self.context.picture
+        drawn = picture and point_explanation.measure_distance(picture)
         hint = "Click two points of the map; a third one gives an angle"
         buttons = [button("Pick points", f"{self.name}:pick", kind="main", hint=hint)]
         if point:
@@ -233,10 +222,12 @@ class DistancePanel(AnalysisPanel):
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action not in ("pick", "stop", "clear"):
             return super().handle(state, action, value)
-        picked = {name: state.forms[name] for name in POINTS if state.forms.get(name)}
-        points = {"pick": dict.fromkeys(POINTS, ""), "stop": picked, "clear": {}}[action]
-        other_forms = {name: text for name, text in state.forms.items() if name not in POINTS}
-        return replace(state, forms={**other_forms, **points})
+        forms = {name: text for name, text in state.forms.items() if name not in POINTS}
+        if action == "pick":
+            forms |= dict.fromkeys(POINTS, "")
+        elif action == "stop":
+            forms |= {name: state.forms[name] for name in POINTS if state.forms.get(name)}
+        return replace(state, forms=forms)
 
 
 class VolumePanel(Section):
@@ -248,7 +239,7 @@ class VolumePanel(Section):
     def body(self, picture: LivePicture) -> Markup:
         statistics, state = picture.statistics, picture.drawn_state
         u95 = {} if picture.uncertainty is None else picture.uncertainty.statistics()
-        intervals = {NAMES[key]: u95_behind(value) for key, value in u95.items()}
+        intervals = {NAMES[key]: formatting.u95_behind(value) for key, value in u95.items()}
         lines = [(name, f"{number(value, 2)}{intervals.get(name, '')} µm")
                  for name, value in zip(NAMES.values(), statistics.four, strict=True)]  # fmt: skip
         if not picture.is_difference:
@@ -261,8 +252,8 @@ class VolumePanel(Section):
         lines += [
             ("nodes", spell_count(picture.field.norm_um.size)),
             ("volume", f"{size} mm"),
-            ("loop", ", ".join((LOOP_WORDS[state.loop], *placed_words(state.view())))),
+            ("loop", ", ".join((formatting.LOOP_WORDS[state.loop], *placed_words(state.view())))),
         ]
-        at = spell_axes(statistics.max_at_axes).removeprefix("axes ")
-        where = f"max at {at} · {spell_in_r(statistics.max_at_mm)} mm"
+        at = formatting.spell_axes(statistics.max_at_axes).removeprefix("axes ")
+        where = f"max at {at} · {formatting.spell_in_r(statistics.max_at_mm)} mm"
         return rows(lines) + tiny(where)

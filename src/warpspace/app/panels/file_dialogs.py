@@ -154,9 +154,8 @@ class FilesDialog(JobDialog):
         opened, camera = scene_file.open_text(text, transfers.safe_name(name), name)
         replaces_all = is_robot or scene_file.settings_of(text) != ""
         if not job.is_set():
-            self.context.call_soon(
-                partial(self.context.show_opened, opened, camera, keeps_comparison=not replaces_all)
-            )
+            show = partial(self.context.show_opened, keeps_comparison=not replaces_all)
+            self.context.call_soon(partial(show, opened, camera))
             self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
 
     def _follow(self, link: str) -> None:
@@ -221,9 +220,8 @@ class FilesDialog(JobDialog):
             view_camera = client.camera
             size = view_camera.image_height, view_camera.image_width
             size_px = np.clip(size, *VIEW_PX).tolist()
-            pixels: Any = client.get_render(
-                *size_px, transport_format="png", timeout=RENDER_TIMEOUT_S
-            )
+            settings: Any = {"transport_format": "png", "timeout": RENDER_TIMEOUT_S}
+            pixels: Any = client.get_render(*size_px, **settings)
             return self.context.services.draw_view(picture, pixels, camera.remember(), job)
 
         self.make("Current view", "_view.png", draw, as_drawn=True)

@@ -209,12 +209,9 @@ class CompensatePanel(AnalysisPanel):
         )  # fmt: skip
         row = [button("Save table", f"{self.name}:table", kind="main", hint=hint)]
         if self.context.services.draw_compensation is not None:
-            row += [
-                button(
-                    "Maps", f"{self.name}:maps", "show", hint="Before, after and residual error"
-                ),
-                button("Save maps", f"{self.name}:maps", "save", hint="One sheet for a report"),
-            ]
+            event, about = f"{self.name}:maps", "Before, after and residual error"
+            row.append(button("Maps", event, "show", hint=about))
+            row.append(button("Save maps", event, "save", hint="One sheet for a report"))
         row.append(button("Add to report", f"{self.name}:report", kind="quiet"))
         row += [RECORD] if box_of(state) != MACHINE else []
         box_choice = tag("div", tag("span", "Map", class_="ws-quiet") + boxes,

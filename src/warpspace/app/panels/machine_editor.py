@@ -16,12 +16,7 @@ from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, fill, join, tag, text_box
 from warpspace.app.evaluation import machine_edits
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine_bodies import (
-    NO_POSITIONS,
-    chosen_trace,
-    played_axis,
-    standing,
-)
+from warpspace.app.evaluation.machine_bodies import chosen_trace, played_axis, standing
 from warpspace.app.panels.block_html import block_html
 from warpspace.app.panels.panel import (
     Dialog,
@@ -102,12 +97,12 @@ class RotarySection(Section):
 
     def body(self, picture: LivePicture) -> Markup:
         state, stage = picture.state, self.context.stage
-        axis, playing, position = played_axis(state), False, NO_POSITIONS
+        axis, playing = played_axis(state), stage is not None and stage.playing
+        position = {} if stage is None else stage.position
         if axis is None:
             return quiet("This machine has no rotary axis.")
         if stage is not None:
             stage.moved = self._follow
-            playing, position = stage.playing, stage.position
         buttons = [button("Pause" if playing else f"Turn {axis}", "rotary:play",
                           hint="Animate the traced points")]  # fmt: skip
         if playing or position:

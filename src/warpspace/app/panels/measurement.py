@@ -356,14 +356,11 @@ class CalibratePanel(FilesPanel):
 
 def arrows_of(calibration: Calibration, *, before: bool) -> tuple[Array, Array]:
     """Return position and residual of each vector reading, [n, 3] mm and [n, 3] mm."""
-    feet: list[Array] = [np.zeros((0, 3))]
-    vectors: list[Array] = [np.zeros((0, 3))]
-    for group in calibration.fitted:
-        lines = group.before_mm if before else group.after_mm
-        if lines.shape[1] == 3:
-            feet.append(group.readings.nominal_mm)
-            vectors.append(lines)
-    return np.concatenate(feet), np.concatenate(vectors)
+    none = np.zeros((0, 3))
+    groups = [group for group in calibration.fitted if group.before_mm.shape[1] == 3]
+    residuals_mm = [group.before_mm if before else group.after_mm for group in groups]
+    feet = [group.readings.nominal_mm for group in groups]
+    return np.concatenate([none, *feet]), np.concatenate([none, *residuals_mm])
 
 
 def _kind_words(kind: str) -> str:

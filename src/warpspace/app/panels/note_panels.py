@@ -14,7 +14,7 @@ from warpspace.app.documents.scene_file import reopened, view_of
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import explain_point, pick_worst, with_picked
-from warpspace.app.panels.panel import Context, Panel, Refresh, actions, quiet, setting, tiny
+from warpspace.app.panels.panel import Panel, Refresh, actions, quiet, setting, tiny
 from warpspace.app.state.app_state import AppState, Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.tree import leaves, set_leaf, stored
@@ -206,9 +206,8 @@ def _revert_decision(state: AppState, note: Note) -> AppState:
         elif math.isclose(now, new, abs_tol=SAME):
             state = set_leaf(state, paths[path], repr(old))
         else:
-            unchanged.append(
-                f"{name} not reverted: now {spell_short(now)} instead of {spell_short(new)}"
-            )
+            values = f"now {spell_short(now)} instead of {spell_short(new)}"
+            unchanged.append(f"{name} not reverted: {values}")
     if len(unchanged) < len(note.change):
         note = note.edited(status="open")
         if len(note.replies) < MAX_REPLIES:
@@ -227,6 +226,8 @@ def _changes(before: AppState, after: AppState) -> dict[str, Pair]:
 
 
 # --- The list -------------------------------------------------------------------------------------
+
+NOTE_FACTS = note_tables.spell_place, note_tables.spell_numbers, note_tables.spell_change
 
 
 def _list_html(state: AppState) -> Markup:
@@ -261,14 +262,7 @@ def _message_html(message: Note | Reply) -> Markup:
 
 
 def _note_html(number: int, note: Note, steps: Sequence[Note]) -> Markup:
-    facts, texts = (
-        [
-            note_tables.spell_place(note),
-            note_tables.spell_numbers(note),
-            note_tables.spell_change(note),
-        ],
-        [_message_html(note)],
-    )
+    facts, texts = [spell(note) for spell in NOTE_FACTS], [_message_html(note)]
     if note.versions:
         texts = [tag("p", "Conflicting edits: select one version.", class_="ws-stale")]
         for index, version in enumerate((note, *note.versions)):
@@ -291,19 +285,13 @@ def _note_html(number: int, note: Note, steps: Sequence[Note]) -> Markup:
 def _buttons(note: Note, steps: Sequence[Note]) -> Markup:
     """Render the buttons of a note; a note with conflicting versions cannot be edited."""
     is_done, free = note.status == "done", not note.versions
-    place = steps.index(note) if note.step else 0
+    place, change = steps.index(note) if note.step else 0, free and note.change
     rows = (
         ("Done", "status", "", "Mark as open" if is_done else "Mark as done", free),
         ("Show", "show", "", "Restore view, errors and camera of the note", True),
         ("Edit", "edit", "", "", free),
         ("Delete", "delete", "", "", True),
-        (
-            "Revert",
-            "take-back",
-            "",
-            "Restore the values before this decision",
-            free and note.change,
-        ),
+        ("Revert", "take-back", "", "Restore the values before this decision", change),
         ("Add to story", "step", "add", "", free and not note.step),
         ("↑", "step", "up", "Earlier in the story", free and place > 0),
         ("↓", "step", "down", "Later in the story", free and note.step and note != steps[-1]),
@@ -354,11 +342,8 @@ class StoryPanel(Panel):
 
     name = "story"
     refresh = Refresh.IMMEDIATE
-
-    def __init__(self, context: Context) -> None:
-        super().__init__(context)
-        self._number, self._step_html = 0, EMPTY  # of the present step; empty while none is played
-        self._camera = context.camera.remember()  # before the story
+    _number, _step_html = 0, EMPTY  # of the present step; empty while none is played
+    _camera: CameraMemory | None = None  # before the story
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         return {"story": self._step_html}

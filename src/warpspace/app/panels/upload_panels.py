@@ -1,4 +1,4 @@
-"""Import of measured errors: the errors that files add and replace, with the effect on the map."""
+"""Sections for uploaded files: import of measured errors, the workpiece, the NC program."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -9,30 +9,33 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from markupsafe import Markup
 
-from warpspace.analysis.blocks import Block, Curve, Lines, Style
-from warpspace.analysis.description import (
-    Analysis,
-    Change,
-    ProgressCallback,
-    Result,
-    ignore_progress,
-)
+from warpspace.analysis import description
+from warpspace.analysis.blocks import Block, Curve, Lines, Style, Table
 from warpspace.analysis.options import Grammar, Option, option, typed_word
 from warpspace.analysis.registry import Entry
-from warpspace.app.browser.html import EMPTY, tag, upload_button
-from warpspace.app.panels.block_html import details_html
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, join, tag, upload_button
+from warpspace.app.browser.incoming import index_of
+from warpspace.app.documents.transfers import IN_BOX, upload_text
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.scene_overlays import AT_LINE, moved_place, part_overlay
+from warpspace.app.panels.analysis_panel import ResultKey
+from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.file_dialogs import accepted_endings
-from warpspace.app.panels.measurement import FilesPanel, UploadedFile
-from warpspace.app.panels.panel import Context, actions
-from warpspace.app.state.app_state import AppState
-from warpspace.app.state.form_values import read_form
+from warpspace.app.panels.measurement import MOST_BYTES, FilesPanel, UploadedFile
+from warpspace.app.panels.panel import Context, actions, quiet, setting
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import AppState, PartLook
+from warpspace.app.state.form_values import option_values, read_form
 from warpspace.exceptions import WarpspaceError
 from warpspace.formats import registry
 from warpspace.formats.measured import BACKWARD, FORWARD, UNDIRECTED, ErrorSeries, summary_table
 from warpspace.formats.source import Source
 from warpspace.formats.to_scene import ImportedScene, build_imported_scene
+from warpspace.kinematics import transforms
 from warpspace.machine.axes import is_linear, parameter
-from warpspace.machine.limits import MAX_UPLOAD_BYTES
+from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
+from warpspace.parts.workpiece import load_workpiece, place_workpiece
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -52,7 +55,7 @@ INTRODUCTION = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Import(Analysis):
+class Import(description.Analysis):
     """Import measured errors, or a compensation table of a controller, into SCENE."""
 
     name = NAME
@@ -74,7 +77,7 @@ class Import(Analysis):
     variant: str | None = option(None, "Published variant of the format", unset="default")
     sources: tuple[Source, ...] = ()
 
-    def run(self, scene: Scene, _watch: ProgressCallback, /) -> "ImportResult":
+    def run(self, scene: Scene, _watch: description.ProgressCallback, /) -> "ImportResult":
         axis, names = registry.parse_axis_options(
             [text for text in re.split(r"[\s,;]+", self.axis) if text]
         )
@@ -88,7 +91,7 @@ class Import(Analysis):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ImportResult(Result):
+class ImportResult(description.Result):
     """Errors read from files, and the scene with them."""
 
     files: str
@@ -96,8 +99,8 @@ class ImportResult(Result):
     reading: registry.Reading
     imported: ImportedScene
 
-    def changes(self) -> Sequence[Change]:
-        return (Change(self.files, self.imported.scene),)
+    def changes(self) -> Sequence[description.Change]:
+        return (description.Change(self.files, self.imported.scene),)
 
     def blocks(self) -> Iterator[Block]:
         errors = self.reading.imported
@@ -203,10 +206,10 @@ class ImportPanel(FilesPanel):
         introduction = EMPTY if self.files else tag("p", INTRODUCTION)
         return introduction + self.files_html() + actions(upload)
 
-    def result_html(self, result: Result) -> Markup:
+    def result_html(self, result: description.Result) -> Markup:
         return details_html(block for block in result.blocks() if not isinstance(block, str))
 
-    def actions(self, result: Result, *, stale: bool) -> Markup:
+    def actions(self, result: description.Result, *, stale: bool) -> Markup:
         return EMPTY
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
@@ -227,7 +230,7 @@ class ImportPanel(FilesPanel):
                 values = self.values(state) if is_joined else {}
                 analysis = read_form(Import, self._options(state, files), values, scene)
                 sources = tuple(file.content for file in files)
-                replace(analysis, sources=sources).run(scene, ignore_progress)
+                replace(analysis, sources=sources).run(scene, description.ignore_progress)
                 break
             except WarpspaceError as error:
                 problem = error
@@ -256,3 +259,156 @@ def _unfolded(state: AppState, *, keeps_forms: bool) -> AppState:
     page = replace(state.page, task="measure", open=state.page.open | {NAME}, window="")
     forms = {k: v for k, v in state.forms.items() if keeps_forms or not k.startswith(f"{NAME}.")}
     return replace(state, page=page, forms=forms)
+
+
+# --- The workpiece and the NC program in the working volume ---------------------------------------
+
+MOST_LETTERS = 200  # of a displayed line
+
+
+class SceneOverlayPanel(FilesPanel):
+    """An uploaded file that is drawn in the working volume: a workpiece or a program."""
+
+    runs_on_open = True
+    most_bytes, what = MAX_UPLOAD_BYTES, "mesh or program"
+    part_fields = ("", "")  # fields of `PartLook`: content and name of the file
+
+    def about(self, state: AppState) -> Markup:
+        """Render details and settings of the content."""
+        raise NotImplementedError
+
+    def result_key(self, state: AppState) -> ResultKey:
+        part = replace(state.part, shown=True, normal=False, moved=False)
+        return (*super().result_key(state), part)
+
+    def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
+        return (*super().body_dependencies(picture), picture.state.part)
+
+    def is_ready(self, state: AppState) -> bool:
+        return getattr(state.part, self.part_fields[0]) is not None
+
+    def before_result(self, state: AppState) -> Markup:
+        content, name = (getattr(state.part, field) for field in self.part_fields)
+        upload = html.upload_button(
+            f"Another {self.name} …" if content else f"{self.title} …", self.name, self.most_bytes,
+            ",".join(IN_BOX[self.name]), kind="" if content else "main",
+            hint=f"At most {self.most_bytes >> 20} MB; files can also be dropped on the page",
+        )  # fmt: skip
+        missing = (
+            f"{name} is not loaded: links and saved scenes store only its name. Open it again."
+        )
+        about = quiet(missing) if name else EMPTY
+        if content:
+            remove = button("✕", f"{self.name}:remove", kind="link", aria_label=f"Remove {name}")
+            about = tag("p", join((tag("b", name), " ", remove))) + self.about(state)
+        return join((about, self.files_html(), actions(upload)))
+
+    def show(self, content: object, name: str, **changes: Any) -> None:
+        """Draw a content, and open the section."""
+
+        def update(state: AppState) -> AppState:
+            opened = state.page.open | {self.name}
+            page = replace(state.page, task=self.task, open=opened, window="")
+            state = replace(state, page=page)
+            return self.with_content(state, content, name, shown=True, **changes)
+
+        self.context.post(update)
+
+    def with_content(self, state: AppState, content: object, name: str, **changes: Any) -> AppState:
+        """Set or remove the content; the map becomes transparent for it."""
+        self.outcome = None
+        fields = dict(zip(self.part_fields, (content, name), strict=True))
+        part = replace(state.part, **fields, **changes)
+        return edits.with_sight(replace(state, part=part), inside=not part.is_empty)
+
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "remove" and not value:
+            return self.with_content(state, None, "")
+        return super().handle(state, action, value)
+
+
+class PartPanel(SceneOverlayPanel):
+    """A workpiece: its placement, and an inspection of it as machined."""
+
+    part_fields = ("mesh", "name")
+    unsupported = ("place", "predistorted")
+    _sent: tuple[str, bytes] | None = None  # read again with another unit
+
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        (scene_part, _), part = PartLook.of_scene(state.scene), state.part
+        features = state.scene.part.path("features") if part.mesh is scene_part.mesh else None
+        tolerances = next(((file.name, file.content) for file in self.files), None)
+        files = {"features": features, "tolerances": tolerances}
+        return {"place": part.place, "mesh": part.mesh, **files}
+
+    def about(self, state: AppState) -> Markup:
+        turns = (button(f"{axis} 90°", f"{self.name}:turn", axis, kind="choice",
+                        hint=f"Rotate by 90° about the workpiece axis {axis}, in place")
+                 for axis in "xyz")  # fmt: skip
+        return join((
+            actions(tag("span", "Rotate about"), *turns),
+            *(setting(state, f"part.{name}") for name in ("place", "shown", "normal", "moved")),
+            html.upload_button("Tolerances …", self.name, MAX_SCENE_BYTES, ".toml",
+                               hint="Names and tolerances of the features"),
+        ))  # fmt: skip
+
+    def result_html(self, result: description.Result) -> Markup:
+        *_, features = (block for block in result.blocks() if isinstance(block, Table))
+        verdicts = [(name, verdict) for name, *_, verdict, _ in features.rows if verdict]
+        return html.rows(verdicts) + super().result_html(result)
+
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        part = part_overlay(state) if action == "turn" and value in ("x", "y", "z") else None
+        if part is not None:
+            turn = transforms.placed(part.of.middle_mm, 90.0 * np.eye(3)["xyz".index(value)])
+            return replace(state, part=replace(state.part, place=moved_place(part.of, turn)))
+        updated = super().handle(state, action, value)
+        if action == "set.unit" and state.part.mesh and self._sent:
+            sent = self._sent
+            self.receive(lambda: sent)
+        return updated
+
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
+        """Parse tolerances, or a mesh; a mesh of another name is placed at the centre."""
+        if name.lower().endswith(".toml"):
+            text = upload_text(content, name, "tolerance file")
+            return partial(self.set_files, (UploadedFile(name, text),))
+        self._sent, state = (name, content), self.context.state
+        mesh = load_workpiece(name, option_values(state, self.name).get("unit") or None, content)
+        present_place = state.part.place if name == state.part.name else None
+        place = np.round(place_workpiece(mesh, state.standing, present_place).place, 3)
+        return partial(self.show, mesh, name, place=tuple(place.tolist()))
+
+
+class ProgramPanel(SceneOverlayPanel):
+    """A program: its lines and its path in the drawing are linked."""
+
+    most_bytes = MOST_BYTES  # longer programs would delay other tabs
+    part_fields = ("program", "program_name")
+
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        return {"file": state.part.program_name, "text": state.part.program}
+
+    def about(self, state: AppState) -> Markup:
+        line, text = state.forms.get(AT_LINE, ""), (state.part.program or "").splitlines()
+        at = index_of(line, len(text) + 1)
+        if not at:
+            return EMPTY
+        return tag("p", join((tag("b", line), " ", tag("code", text[at - 1][:MOST_LETTERS]))))
+
+    def result_html(self, result: description.Result) -> Markup:
+        def link(line: int) -> Markup:
+            hint = "Show this line in the drawing; a click on the path selects its line"
+            return button(line, f"{self.name}:set.at_line", line, kind="link", hint=hint)
+
+        *tables, worst = (block for block in result.blocks() if isinstance(block, Table))
+        line, *columns = worst.columns
+        columns = (
+            replace(block, shows=block.heading in ("|E|", "largest contributions"))
+            for block in columns
+        )
+        narrow = replace(worst, columns=(replace(line, form=link), *columns))
+        return block_html(narrow) + details_html((*tables, worst))
+
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
+        return partial(self.show, content.decode("utf-8-sig", "replace"), name)
