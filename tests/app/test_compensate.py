@@ -22,16 +22,9 @@ from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.machine_bodies import tool_point
 from warpspace.app.evaluation.machine_edits import with_changed_scene
 from warpspace.app.evaluation.point_explanation import measure_distance, pick_worst, with_picked
+from warpspace.app.panels import improve
 from warpspace.app.panels.analysis_panel import AnalysisOutcome
 from warpspace.app.panels.conventions import with_reference
-from warpspace.app.panels.improve import (
-    COMPARISON,
-    RESIDUAL,
-    CompensatePanel,
-    is_applicable_to,
-    packed,
-    with_box,
-)
 from warpspace.app.server.tab_keeper import NO_TABLE, page_copy_text, read_page_copy
 from warpspace.app.state.app_state import PartLook, start_state
 from warpspace.app.state.tree import put
@@ -53,7 +46,7 @@ CHOICE = {"formats": "heidenhain", "points": "9"}
 
 def asking(state=START, choice=CHOICE):
     """Give the part, and the state with what was chosen."""
-    part = lone_part(CompensatePanel, "compensate")
+    part = lone_part(improve.CompensatePanel, "compensate")
     part.context.store = SimpleNamespace(state=state)
     return part, replace(state, forms={f"compensate.{key}": one for key, one in choice.items()})
 
@@ -76,7 +69,7 @@ def controller(found):
 @pytest.fixture(scope="module")
 def left(controller):
     """The machine with its table."""
-    return with_box(START, RESIDUAL, controller)
+    return improve.with_box(START, improve.RESIDUAL, controller)
 
 
 @pytest.mark.parametrize(
@@ -97,7 +90,7 @@ def test_the_box_has_the_field_of_the_command(name, points, loop, orientation):
         orientation=orientation,
     )  # fmt: skip
     command = compensate(SCENE, asked, 9)
-    picture = LIVE.evaluate(with_box(START, RESIDUAL, given.controller))
+    picture = LIVE.evaluate(improve.with_box(START, improve.RESIDUAL, given.controller))
     assert picture.state.loop == Loop(command.loop)
     assert np.abs(picture.field.error_um - command.after.error_um).max() < 1e-9
     tilts = picture.field.orientation_urad - command.after.orientation_urad
@@ -119,7 +112,7 @@ def test_the_machine_may_drift_under_its_table(left, controller):
 
 
 def test_before_and_after_stand_side_by_side(left, controller):
-    compared = LIVE.evaluate(with_box(START, COMPARISON, controller)).compared
+    compared = LIVE.evaluate(improve.with_box(START, improve.COMPARISON, controller)).compared
     before, after = LIVE.evaluate(START), LIVE.evaluate(left)
     assert (compared.a, compared.b) == (before.statistics, after.statistics)
     assert WITH_TABLE in compared.titles[1]
@@ -128,7 +121,7 @@ def test_before_and_after_stand_side_by_side(left, controller):
 
 def test_slices_and_the_tool_point_have_the_table_too(controller):
     look = replace(START.look, surface="slices")
-    left = with_box(replace(START, look=look), RESIDUAL, controller)
+    left = improve.with_box(replace(START, look=look), improve.RESIDUAL, controller)
     bare, picture = LIVE.evaluate(replace(START, look=look)), LIVE.evaluate(left)
     for plain, cut in zip(bare.slices, picture.slices, strict=True):
         wanted = controller.field(cut.grid.coordinates, cut.grid.nominal_mm)
@@ -165,14 +158,14 @@ def test_what_changes_the_machine_ends_the_table(left, controller):
     machine = replace(SCENE.model.machine, title="another")
     other = replace(SCENE, model=replace(SCENE.model, machine=machine))
     assert with_changed_scene(left, other).controller is None
-    assert is_applicable_to(START, controller)
-    assert not is_applicable_to(start_state(load_scene("fork_head_bc")), controller)
+    assert improve.is_applicable_to(START, controller)
+    assert not improve.is_applicable_to(start_state(load_scene("fork_head_bc")), controller)
     assert left.reset().controller is controller
     assert left.with_amplitude("EXX", 3.0).controller is controller
 
 
 def test_whatever_is_shown_says_which_machine_it_is_of(left, controller):
-    both = with_box(START, COMPARISON, controller)
+    both = improve.with_box(START, improve.COMPARISON, controller)
     picture = LIVE.evaluate(left)
     page = build_offline_html(picture)
     for shown in (subject_words(picture), picture_conditions(picture), page):
@@ -189,7 +182,7 @@ def test_whatever_is_shown_says_which_machine_it_is_of(left, controller):
 
 
 def test_no_file_keeps_the_table_and_a_restored_tab_says_so(controller):
-    both = with_box(START, COMPARISON, controller)
+    both = improve.with_box(START, improve.COMPARISON, controller)
     assert state_to_toml(without_table(both), None) == state_to_toml(START, None)
     restored, _, missing = read_page_copy(page_copy_text(both, None, [SCENE]), [SCENE])
     assert restored.controller is None
@@ -209,7 +202,7 @@ def test_words_of_others_are_escaped(found, controller):
     hostile = "<script>alert(1)</script>"
     worded = replace(controller, label=hostile, notes=(hostile,), assumed=(hostile,))
     given = replace(found, controller=worded)
-    left = with_box(START, RESIDUAL, worded)
+    left = improve.with_box(START, improve.RESIDUAL, worded)
     for text in (
         shown(*asking(), given),
         build_offline_html(LIVE.evaluate(left)).partition("<iframe")[0],
@@ -231,7 +224,7 @@ def test_a_table_is_saved_whole_and_the_box_then_shows_before_and_after(found):
     assert zipfile.ZipFile(io.BytesIO(content)).namelist() == [
         f"compensation{add or found.format.endings[0]}" for add in found.files
     ]
-    assert packed(found) == (name, content)  # the same table gives the same bytes
+    assert improve.packed(found) == (name, content)  # the same table gives the same bytes
     assert part.handle(after, "box", "machine").controller is None
     assert part.handle(state, "box", "<b>") == state
     assert part.handle(state, "set.formats", "<b>").forms["compensate.formats"] == "<b>"
@@ -273,7 +266,7 @@ def test_maps_are_drawn_beside_the_page(found):
 def test_machines_with_few_moving_axes_have_box_and_maps_too(name):
     state = start_state(still_scene(name))
     given = computed(state, {**CHOICE, "points": "5"})
-    picture = LIVE.evaluate(with_box(state, COMPARISON, given.controller))
+    picture = LIVE.evaluate(improve.with_box(state, improve.COMPARISON, given.controller))
     assert picture.compared.b.max_um <= picture.compared.a.max_um
     for narrow in (True, False):
         assert compensation_maps(given, False, narrow).axes

@@ -14,12 +14,7 @@ from PIL import Image
 
 import glb
 from offline import EVIL, opened_offline, wait_for_the_map
-from warpspace.app.documents.legend import (
-    look_words,
-    picture_conditions,
-    projected_labels,
-    state_conditions,
-)
+from warpspace.app.documents import legend
 from warpspace.app.documents.offline_page import build_offline_html, offline_picture
 from warpspace.app.documents.transfers import exported_words, file_stem, shown_sides
 from warpspace.app.drawing.camera import CameraMemory, fit_camera
@@ -169,13 +164,13 @@ def fixed(state):
 
 
 def test_conditions_name_what_is_excluded_and_the_range():
-    assert picture_conditions(LIVE.evaluate(START)) == ()
+    assert legend.picture_conditions(LIVE.evaluate(START)) == ()
     both = put(without("EA0Z"), "exclusions.excluded", "+EAX")
-    assert picture_conditions(fixed(both)) == ("excluded: EAX, EA0Z", "range fixed 0–50 µm")
+    assert legend.picture_conditions(fixed(both)) == ("excluded: EAX, EA0Z", "range fixed 0–50 µm")
     only = put(START, "exclusions.only", "+EAX")
-    assert picture_conditions(LIVE.evaluate(only)) == ("only: EAX",)
+    assert legend.picture_conditions(LIVE.evaluate(only)) == ("only: EAX",)
     # an error that is zero changes nothing when it is left out
-    assert picture_conditions(LIVE.evaluate(without("EYX"))) == ()
+    assert legend.picture_conditions(LIVE.evaluate(without("EYX"))) == ()
     assert range_words(-20.0, 20.0, "µm") == "range fixed −20 to 20 µm"
 
 
@@ -188,14 +183,14 @@ def test_exports_say_the_conditions():
     footer = build_offline_html(picture).partition("<footer>")[2]
     assert "excluded: EA0Z" in footer
     assert "range fixed 0–50 µm" in footer
-    assert "excluded: EA0Z" in look_words(picture)  # of pictures of the screen
+    assert "excluded: EA0Z" in legend.look_words(picture)  # of pictures of the screen
 
 
 def test_a_comparison_says_the_conditions_of_each_side():
     picture = picture_of("difference", with_sides(without("EA0Z"), Side(), scene_side(SECOND)))
-    assert picture_conditions(picture) == ("A excluded: EA0Z",)
+    assert legend.picture_conditions(picture) == ("A excluded: EA0Z",)
     assert rows_of(picture)[0]["conditions"] == "A excluded: EA0Z"
-    conditions = [state_conditions(one) for one in shown_sides(picture)]
+    conditions = [legend.state_conditions(one) for one in shown_sides(picture)]
     assert conditions == [("excluded: EA0Z",), ()]
 
 
@@ -244,9 +239,9 @@ def test_a_picture_of_the_screen_says_what_it_shows_beside_its_pixels():
     pose = fit_camera(picture.drawn_mm.reshape(-1, 3), 1.5, margins=(0.2, 0.2, 0.2, 0.2))
     pixels = np.zeros((400, 600, 4), np.uint8)
     pixels[180:220, 250:350] = (90, 10, 200, 255)
-    words, px_per_mm = projected_labels(picture, pose, 400, 600)
+    words, px_per_mm = legend.projected_labels(picture, pose, 400, 600)
     unbarred = replace(picture, state=replace(BOTH, look=replace(BOTH.look, bars=False)))
-    assert projected_labels(unbarred, pose, 400, 600)[1] is None
+    assert legend.projected_labels(unbarred, pose, 400, 600)[1] is None
     # a millimetre of the middle of the picture, seen from as far
     assert px_per_mm == pytest.approx(
         200.0 / np.tan(pose.fov_rad / 2.0)

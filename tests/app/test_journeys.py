@@ -190,9 +190,5 @@ def test_a_click_asks_why_and_a_saved_scene_holds_what_was_changed(tab):
     )
     tab.send("page:reset")
     tab.until(lambda: tab.state.amplitudes["EXX"] == 0.0)
-    tab.give(
-        "mine.toml",
-        text.encode(),
-        tab.page.get_by_role("button", name="Open").first.click,
-    )
+    tab.give("mine.toml", text.encode(), tab.page.get_by_role("button", name="Open").first.click)
     tab.until(lambda: tab.state.amplitudes["EXX"] == 3.25 and tab.state.picked is not None)

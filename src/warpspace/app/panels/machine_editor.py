@@ -17,17 +17,8 @@ from warpspace.app.browser.html import EMPTY, button, fill, join, tag, text_box
 from warpspace.app.evaluation import machine_edits
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import chosen_trace, played_axis, standing
+from warpspace.app.panels import panel
 from warpspace.app.panels.block_html import block_html
-from warpspace.app.panels.panel import (
-    Dialog,
-    Section,
-    actions,
-    alert,
-    details,
-    quiet,
-    setting,
-    tiny,
-)
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_spans
 from warpspace.app.state.tree import leaves
@@ -42,7 +33,7 @@ from warpspace.units import MICROMETRE, MINUS
 OPEN_MESH = "A mesh of this machine is not watertight; it is drawn unchanged."
 
 
-class PositionsSection(Section):
+class PositionsSection(panel.Section):
     name, task, title = "positions", "machine", "Axis positions"
     sentence = "Rotary axes move the working volume, linear axes the tool point"
 
@@ -55,9 +46,9 @@ class PositionsSection(Section):
         is_open = state.machine.shown and check_meshes(state.scene.machine)
         linear = (f"machine.linear_mm.{axis}" for axis in linear_spans(state.scene))
         paths = (*(f"positions.{axis}" for axis in state.positions), *linear)
-        bars = [setting(state, path, bar=True) for path in paths]
+        bars = [panel.setting(state, path, bar=True) for path in paths]
         lines = (position, OPEN_MESH) if is_open else (position,)
-        return join((*bars, *(tiny(line) for line in lines)))
+        return join((*bars, *(panel.tiny(line) for line in lines)))
 
 
 # --- Rotary axes: animation, polar plots of one trace, table of all traces ------------------------
@@ -91,7 +82,7 @@ AVERAGE = (
 MOST_ROWS = 24  # traces in the table
 
 
-class RotarySection(Section):
+class RotarySection(panel.Section):
     name, task, title = "rotary", "machine", "Rotary axes"
     sentence = "Error motion of traced points during rotation of an axis (ISO 230-7)"
 
@@ -100,7 +91,7 @@ class RotarySection(Section):
         axis, playing = played_axis(state), stage is not None and stage.playing
         position = {} if stage is None else stage.position
         if axis is None:
-            return quiet("This machine has no rotary axis.")
+            return panel.quiet("This machine has no rotary axis.")
         if stage is not None:
             stage.moved = self._follow
         buttons = [button("Pause" if playing else f"Turn {axis}", "rotary:play",
@@ -112,7 +103,7 @@ class RotarySection(Section):
             hint, path = "Move the axis to the paused position", f"state:set.positions.{axis}"
             buttons.append(button("Move axes here", path, round(position[axis]), hint=hint))
         return join((
-            actions(*buttons),
+            panel.actions(*buttons),
             fill('<p data-piece="rotary.angle" class="ws-tiny"></p>'),
             _trace(picture), _points(state, axis),
         ))  # fmt: skip
@@ -135,18 +126,18 @@ class RotarySection(Section):
 def _trace(picture: LivePicture) -> Markup:
     if not picture.state.shown.traces:
         turn_on = button("Show traces", "state:set.shown.traces", "1", kind="main")
-        return actions(turn_on)
+        return panel.actions(turn_on)
     moved = picture.moved_traces
     if not moved:
-        return quiet(NOTHING_MOVED)
+        return panel.quiet(NOTHING_MOVED)
     name, path = chosen_trace(picture), "state:set.rotary.chosen"
     chosen = html.field("Trace", html.choice(path, name, {trace: trace for trace in moved}), path)
     motions = {trace: motion_of(picture, moved[trace]) for trace in [*moved][:MOST_ROWS]}
     motion = motions[name] if name in motions else motion_of(picture, moved[name])
-    motion_plots = _motion(motion, name) if motion else quiet(ON_THE_AXIS)
+    motion_plots = _motion(motion, name) if motion else panel.quiet(ON_THE_AXIS)
     head = join(fill("<th>{} <small>{}</small></th>", *heading) for heading in HEADS.items())
     table = tag("table", tag("tr", head) + join(starmap(_numbers, motions.items())))
-    return chosen + motion_plots + details("Table of all traces", tiny(AVERAGE), table)
+    return chosen + motion_plots + panel.details("Table of all traces", panel.tiny(AVERAGE), table)
 
 
 def _numbers(name: str, motion: AxisMotion | None) -> Markup:
@@ -184,10 +175,10 @@ def _motion(motion: AxisMotion, name: str) -> Markup:
     for part in motion.motions:
         chart = motion_lines(part.name, motion, part)
         plots.append(block_html(replace(chart, title=part.name, note="")))
-        notes.append(tiny(f"{part.iso}: {chart.note}."))
+        notes.append(panel.tiny(f"{part.iso}: {chart.note}."))
     label = f"Error motion of {name}"
     drawn = tag("div", join(plots), class_="ws-plots", role="group", aria_label=label)
-    return join((drawn, fill(KEY), *notes, tiny(ABOUT)))
+    return join((drawn, fill(KEY), *notes, panel.tiny(ABOUT)))
 
 
 def _points(state: AppState, played: str) -> Markup:
@@ -196,16 +187,16 @@ def _points(state: AppState, played: str) -> Markup:
         on = index not in state.rotary.off
         change = f"{'+' if on else '-'}{index}"
         traced.append(button(f"Trace {name}", "state:set.rotary.off", change, pressed=on))
-    parts = [actions(*traced), setting(state, "rotary.own_mm")]
+    parts = [panel.actions(*traced), panel.setting(state, "rotary.own_mm")]
     if len(state.positions) > 1:
-        parts += [setting(state, f"rotary.held.{axis}") for axis in state.position_spans]
+        parts += [panel.setting(state, f"rotary.held.{axis}") for axis in state.position_spans]
         low, high = state.scene.machine.axes[played].travel
         high = min(high, low + 359.0)  # at most one revolution
         turns = range(math.ceil(low / 90.0), math.floor(high / 90.0) + 1)
         positions, hint = ",".join(str(90 * turn) for turn in turns), "While the other axis rotates"
         path = f"state:set.rotary.held.{played}"
         parts.append(button(f"Hold {played} at every 90°", path, positions, hint=hint))
-    return details("Traced points and positions", *parts)
+    return panel.details("Traced points and positions", *parts)
 
 
 # --- The editor: chain, frames, travels and working volume ----------------------------------------
@@ -242,7 +233,7 @@ MACHINE_BUTTONS = (
 )  # fmt: skip
 
 
-class EditorSection(Section):
+class EditorSection(panel.Section):
     name, task, title = "editor", "machine", "Edit the machine"
     sentence = "Axes, their order, offsets and travels; or another machine to start from"
 
@@ -256,12 +247,12 @@ class EditorSection(Section):
         machine_buttons = (button(*arguments, hint=hint) for *arguments, hint in MACHINE_BUTTONS)
         return join((
             html.field("Chain", box, name, hint=CHAIN_HINT),
-            alert(problem) if problem else EMPTY,
+            panel.alert(problem) if problem else EMPTY,
             *(_frame(state, tables, frame)
               for frame in ("w", *reversed(chain.workpiece), *chain.tool, "S", "t")),
             _bodies(tables["mesh"]),
-            *(tiny(note) for note in state.scene.notes),
-            actions(*machine_buttons),
+            *(panel.tiny(note) for note in state.scene.notes),
+            panel.actions(*machine_buttons),
         ))  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -309,9 +300,9 @@ def _frame(state: AppState, tables: machine_edits.Tables, name: str) -> Markup:
             hint, pressed = "Gantry: two guides with independent errors", gantry is not None
             guides = button("Two guides", "editor:do", f"gantry {name}", hint=hint, pressed=pressed)
             buttons.insert(-1, guides)
-        lines += [*_guides(state, gantry), actions(*buttons)]
+        lines += [*_guides(state, gantry), panel.actions(*buttons)]
     heading = fill("<b>{}</b> {}", name, about)
-    return details(heading, *lines, kind="frame", data_key=f"frame-{name}")
+    return panel.details(heading, *lines, kind="frame", data_key=f"frame-{name}")
 
 
 def _boxes(
@@ -346,7 +337,7 @@ def _guides(state: AppState, gantry: Gantry | None) -> list[Markup]:
     hint = "Click to change the direction"
     across = button(f"Spaced along {gantry.across}", "editor:do", f"across {name}", kind="link",
                     hint=hint)  # fmt: skip
-    return [*lines, across, tiny(note)]
+    return [*lines, across, panel.tiny(note)]
 
 
 def _bodies(bodies: dict[str, BodySource]) -> Markup:
@@ -355,8 +346,10 @@ def _bodies(bodies: dict[str, BodySource]) -> Markup:
         remove = button("Remove", "editor:do", f"mesh {frame}", kind="link",
                         aria_label=f"Remove the body of {frame}")  # fmt: skip
         lines.append(tag("p", join((tag("b", frame), " ", _source(source), " ", remove))))
-    lines = [*(lines or [tag("p", "All bodies are generated automatically.")]), tiny(BODIES)]
-    return details("Bodies defined by the scene", *lines, kind="frame", data_key="frame-bodies")
+    lines = [*(lines or [tag("p", "All bodies are generated automatically.")]), panel.tiny(BODIES)]
+    return panel.details(
+        "Bodies defined by the scene", *lines, kind="frame", data_key="frame-bodies"
+    )
 
 
 def _source(source: BodySource) -> str:
@@ -375,7 +368,7 @@ def _source(source: BodySource) -> str:
 WIDTH_PX = 240  # of a thumbnail; displayed smaller, for high-resolution screens
 
 
-class MachinesDialog(Dialog):
+class MachinesDialog(panel.Dialog):
     name, title = "machines", "Start from a machine"
 
     def body(self, picture: LivePicture) -> Markup:
