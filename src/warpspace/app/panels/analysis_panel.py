@@ -218,8 +218,7 @@ class AnalysisPanel(Section):
                        kind="main" if label == "Apply" else "", disabled=outcome.key != key)
                 for label, hint in hints.items()
             )  # fmt: skip
-            card = outcome.cards[index][1] + actions(*buttons)
-            cards.append(tag("div", card, class_="ws-card"))
+            cards.append(tag("div", outcome.cards[index][1] + actions(*buttons), class_="ws-card"))
         return join(cards)
 
     def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:

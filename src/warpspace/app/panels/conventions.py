@@ -79,8 +79,7 @@ def choice_groups(scene: Scene) -> dict[tuple[str, str], dict[str, str]]:
         },
     }
     for kind, moves in (("Rotary", "turns"), ("Linear", "moves")):
-        hint = f"+1 {moves} in the direction of the axis name, −1 against it"
-        groups[f"{kind} axes", hint] = {
+        groups[f"{kind} axes", f"+1 {moves} in the direction of the axis name, −1 against it"] = {
             f"direction {axis}={sign}": f"{axis} {label}"
             for axis in sorted(scene.machine.axes)
             if is_linear(axis) == (kind == "Linear")
@@ -115,8 +114,7 @@ def with_choice(state: AppState, choice: str) -> AppState:
         return _with_scene(state, changed)
     axis = model.machine.axes[group.removeprefix("direction ")]
     axes = {**model.machine.axes, axis.name: replace(axis, direction=int(chosen_value))}
-    machine = replace(model.machine, axes=axes)
-    return _with_scene(state, replace(model, machine=machine))
+    return _with_scene(state, replace(model, machine=replace(model.machine, axes=axes)))
 
 
 def with_own_conventions(state: AppState) -> AppState:
@@ -154,8 +152,7 @@ def effects_of(state: AppState) -> dict[str, Effect]:
 
 
 def _error(state: AppState) -> tuple[Array, Array]:
-    workspace = state.scene.workspace.moved(state.positions)
-    grid = build_grid(state.scene.model, workspace, state.nodes)
+    grid = build_grid(state.scene.model, state.scene.workspace.moved(state.positions), state.nodes)
     return grid.weights, evaluate_grid(state.active_scene(), grid, state.view()).error_um
 
 

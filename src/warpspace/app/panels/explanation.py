@@ -99,8 +99,7 @@ class WorstPanel(Section):
         if picture is None or picture.state.picked is None or picture.is_difference:
             return
         explanation = self._explain(picture)
-        contributions = explanation.explanation.contributions
-        origins = [c.origin_mm + explanation.shift_mm for c in contributions
+        origins = [c.origin_mm + explanation.shift_mm for c in explanation.explanation.contributions
                    if c.key == picture.state.lever]  # fmt: skip
         if origins:
             points = np.concatenate([picture.drawn_mm.reshape(-1, 3), np.stack(origins)])
@@ -255,5 +254,4 @@ class VolumePanel(Section):
             ("loop", ", ".join((formatting.LOOP_WORDS[state.loop], *placed_words(state.view())))),
         ]
         at = formatting.spell_axes(statistics.max_at_axes).removeprefix("axes ")
-        where = f"max at {at} · {formatting.spell_in_r(statistics.max_at_mm)} mm"
-        return rows(lines) + tiny(where)
+        return rows(lines) + tiny(f"max at {at} · {formatting.spell_in_r(statistics.max_at_mm)} mm")

@@ -112,8 +112,7 @@ class FilesDialog(JobDialog):
         ))  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
-        services = self.context.services
-        if action == "share" and services.token and not value:
+        if action == "share" and self.context.services.token and not value:
             return replace(state, page=replace(state.page, window=self.name))
         commands: dict[str, Callable[[], None]] = {
             "file": partial(self._open, value),
@@ -279,7 +278,6 @@ class ReportDialog(JobDialog):
         ]
         # the list of notes may hold a box for the same name
         author = text_box("state:set.page.author", picture.state.page.author, id="ws-report-author")
-        hint = "To add more results, use “Add to report” below a result."
         return join((
             tag("p", f"{subject} Limit: {limit}."),
             field("Author", author, "report.author"),
@@ -290,7 +288,7 @@ class ReportDialog(JobDialog):
             self._jobs.html(),
             tag("h3", "Contents"),
             tag("ul", join((*(tag("li", chapter) for chapter in ALWAYS), *added))),
-            quiet(hint),
+            quiet("To add more results, use “Add to report” below a result."),
         ))  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:

@@ -178,8 +178,7 @@ class CompensatePanel(AnalysisPanel):
         control = choice(f"{self.name}:set.formats", chosen, names, label="Controller")
         if chosen:
             return control
-        text = "A compensation table for the controller, and the residual error."
-        return control + quiet(text)
+        return control + quiet("A compensation table for the controller, and the residual error.")
 
     def headline(self, result: Result) -> Markup:
         return EMPTY

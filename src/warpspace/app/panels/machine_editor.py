@@ -125,8 +125,7 @@ class RotarySection(panel.Section):
 
 def _trace(picture: LivePicture) -> Markup:
     if not picture.state.shown.traces:
-        turn_on = button("Show traces", "state:set.shown.traces", "1", kind="main")
-        return panel.actions(turn_on)
+        return panel.actions(button("Show traces", "state:set.shown.traces", "1", kind="main"))
     moved = picture.moved_traces
     if not moved:
         return panel.quiet(NOTHING_MOVED)
@@ -334,9 +333,8 @@ def _guides(state: AppState, gantry: Gantry | None) -> list[Markup]:
     else:
         values = [round(value, 9) for value in errors]
         lines.append(_boxes(f"guide {name}", "Error of each guide", MICROMETRE, values, "12"))
-    hint = "Click to change the direction"
     across = button(f"Spaced along {gantry.across}", "editor:do", f"across {name}", kind="link",
-                    hint=hint)  # fmt: skip
+                    hint="Click to change the direction")  # fmt: skip
     return [*lines, across, panel.tiny(note)]
 
 

@@ -89,8 +89,7 @@ class FilesPanel(AnalysisPanel):
 
     def upload_html(self, label: str) -> Markup:
         hint = f"A CSV file with a header, at most {MOST_BYTES >> 20} MB"
-        upload = html.upload_button(label, self.name, MOST_BYTES, ".csv", hint=hint)
-        return actions(upload)
+        return actions(html.upload_button(label, self.name, MOST_BYTES, ".csv", hint=hint))
 
     def receive(self, read: Callable[[], tuple[str, bytes]]) -> None:
         """Parse files in jobs, one after the other; errors are shown above the files."""

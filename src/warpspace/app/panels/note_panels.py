@@ -378,8 +378,7 @@ class StoryPanel(Panel):
         context.notes += story_state.notes
         context.story_state = replace(story_state.without_notes(), page=before.page)
         self._number = number
-        text = step_words(now.resulting_scene(), notes, number, problem)
-        self._step_html = text + actions(
+        self._step_html = step_words(now.resulting_scene(), notes, number, problem) + actions(
             button("←", "story:back", hint="Previous step (←)", aria_label="Previous step",
                    disabled=number == 0),
             button("→", "story:on", kind="main", hint="Next step (→)", aria_label="Next step",

@@ -123,7 +123,6 @@ class OverlayPanel(Panel):
 def _facts(picture: LivePicture) -> dict[str, Any]:
     look, grid = picture.state.look, picture.grid
     isolines = look.isolines and look.surface != "grid"
-    bounds = [piece.grid.bounds_mm for piece in picture.slices]
     return {
         "axes": _labels_json(Identity(axis_labels(picture))),
         "triad": [
@@ -147,7 +146,7 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
         "slices": [
             {"axis": (axis := int((high - low).argmin())), "at": _scene(low)[axis],
              "low": _scene(low), "high": _scene(high)}
-            for low, high in bounds
+            for low, high in [piece.grid.bounds_mm for piece in picture.slices]
         ],
     }  # fmt: skip
 
@@ -405,10 +404,9 @@ def _sides(compared: Compared) -> Markup:
     hints = {"a": compared.titles[0], "b": compared.titles[1], "difference": difference}
     choices: list[Markup] = []
     for key, label in COMPARISON_VIEWS.items():
-        is_refused = bool(compared.refused) and key == "difference"
         choices.append(button(label, "state:set.comparison.shown", key, kind="chip",
                               hint=hints[key], pressed=compared.view == key,
-                              disabled=is_refused))  # fmt: skip
+                              disabled=bool(compared.refused) and key == "difference"))  # fmt: skip
     leave = button("✕", "compare:leave", kind="chip", hint="End the comparison",
                    aria_label="End the comparison")  # fmt: skip
     return tag("div", join((*choices, leave)), role="group", aria_label="Displayed side")

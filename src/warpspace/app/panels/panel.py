@@ -308,8 +308,7 @@ def alert(text: object) -> Markup:
 
 def details(heading: object, *parts: object, kind: str = "options", **extra: object) -> Markup:
     """Render parts that are folded away under a heading."""
-    body = join((tag("summary", heading), *parts))
-    return tag("details", body, class_=f"ws-{kind}", **extra)
+    return tag("details", join((tag("summary", heading), *parts)), class_=f"ws-{kind}", **extra)
 
 
 def setting(state: AppState, path: str, *, text: str = "", bar: bool = False) -> Markup:

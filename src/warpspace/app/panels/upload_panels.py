@@ -308,8 +308,7 @@ class SceneOverlayPanel(FilesPanel):
 
         def update(state: AppState) -> AppState:
             opened = state.page.open | {self.name}
-            page = replace(state.page, task=self.task, open=opened, window="")
-            state = replace(state, page=page)
+            state = replace(state, page=replace(state.page, task=self.task, open=opened, window=""))
             return self.with_content(state, content, name, shown=True, **changes)
 
         self.context.post(update)
