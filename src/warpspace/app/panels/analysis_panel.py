@@ -94,12 +94,10 @@ class AnalysisPanel(Section):
     # --- what a subclass may override ------------------------------------------------------------
 
     def options(self) -> Sequence[Option]:
-        """List the options that the page supports."""
         options = [o for o in self.kind.options() if o.name not in self.unsupported]
         return [o for o in options if not (o.grammar and o.grammar.is_file)]
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
-        """List the options that apply to the state."""
         return self.options()
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
@@ -141,7 +139,6 @@ class AnalysisPanel(Section):
         return EMPTY
 
     def headline(self, result: Result) -> Markup:
-        """Render the sentences of the result."""
         # the title of the scene is at the top of the page
         prefix, sentences = self._title_prefix, (b for b in result.blocks() if isinstance(b, str))
         return join(block_html(sentence.removeprefix(prefix)) for sentence in sentences)
@@ -151,11 +148,9 @@ class AnalysisPanel(Section):
         return range(len(self.outcome.cards) if self.outcome else 0)[::-1]
 
     def result_html(self, result: Result) -> Markup:
-        """Render its tables and charts."""
         return result_html(block for block in result.blocks() if not isinstance(block, str))
 
     def actions(self, result: Result, *, stale: bool) -> Markup:
-        """Render the buttons below a result."""
         saves = [button(f"Save {end}", f"{self.name}:save", end) for end in _endings(result)]
         saves.append(button("Add to report", f"{self.name}:report", kind="quiet"))
         return actions(*saves)

@@ -120,7 +120,6 @@ class PlotFrame:
         return PlotFrame(x, y)
 
     def axes(self, x_label: str, y_label: str) -> Markup:
-        """Draw ticks with their values, and the labels of the axes."""
         floor, middle = HIGH - BOTTOM, (TOP + HIGH - BOTTOM) / 2.0
         parts = [_text(x_label, (MARGIN_LEFT + WIDE - RIGHT) / 2.0, HIGH - 4),
                  _text(y_label, 9, middle, transform=f"rotate(-90 9 {middle:.0f})")]  # fmt: skip
@@ -160,7 +159,6 @@ def lines_html(chart: Lines) -> Markup:
 
 
 def histogram_html(chart: blocks.Histogram) -> Markup:
-    """Draw a distribution with its limit."""
     limit = math.inf if chart.limit is None else chart.limit
     ends = float(chart.edges[0]), max(float(chart.edges[-1]), chart.limit or 0.0)
     frame = PlotFrame(ends, (0.0, max(float(chart.heights.max()), 1e-9) * 1.05))

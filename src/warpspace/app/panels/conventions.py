@@ -93,7 +93,6 @@ def choices(scene: Scene) -> list[str]:
 
 
 def chosen(scene: Scene) -> set[str]:
-    """Return the choices in force."""
     return {
         f"component_errors={scene.model.component_errors}",
         "reference=absolute" if scene.reference is None else "reference=point",

@@ -200,8 +200,6 @@ def _sampled(state: AppState) -> ResultKey:
 
 
 def sample_machines(state: AppState) -> Ensemble:
-    """Sample machines for the tolerances of a state."""
-
     def build() -> Ensemble:
         scene, specification = state.resulting_scene(), state.specification
         keys = loop_keys(scene.model, state.loop, scene.parameter_keys)
@@ -242,7 +240,6 @@ def estimate(
 
 
 def tolerance_shares(ensemble: Ensemble, tolerances: ToleranceSet) -> dict[str, float]:
-    """Compute the share of each tolerance in the variance of the error."""
     _, half_widths = _centres_and_widths(ensemble, tolerances)
     variances = half_widths**2 * ensemble.mean_square_gain
     shares = variances / (float(variances.sum()) or 1.0)

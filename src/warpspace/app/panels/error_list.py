@@ -105,15 +105,12 @@ TYPING = (
 
 @dataclass(frozen=True, slots=True)
 class CurveEditFeedback:
-    """Feedback on an edited curve."""
-
     text: str  # rows as typed or read
     message: str
     is_problem: bool
 
 
 def curve_html(state: AppState, key: str, feedback: CurveEditFeedback | None) -> Markup:
-    """Render chart, origin and editor of an error."""
     row, function = parameter(key), state.curve(key)
     only, excluded = key in state.exclusions.only, key in state.exclusions.excluded
     origin, is_edited = origin_words(state, key)
@@ -234,7 +231,6 @@ def _finite(values: Array) -> Array:
 
 
 def describe_curve(name: str, unit: str, along: str, at: Array, value: Array) -> str:
-    """Describe the curve of an error for screen readers."""
     if np.ptp(value) == 0.0:
         return f"{name}: {spell(float(value[0]))} {unit} everywhere"
     ends = (0, len(at) - 1)

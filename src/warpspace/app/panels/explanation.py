@@ -197,8 +197,6 @@ def _lever(contribution: PointContribution) -> Markup:
 
 
 class DistancePanel(AnalysisPanel):
-    """Distance and angle between points picked on the map."""
-
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (*super().body_dependencies(picture), id(picture))
 

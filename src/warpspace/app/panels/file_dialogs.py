@@ -140,7 +140,6 @@ class FilesDialog(JobDialog):
         self._uploads.queue("Opening", partial(self._parse, value))
 
     def _parse(self, value: str, job: Job) -> None:
-        """Parse a file in a job."""
         name, content = transfers.read_upload(value)
         notes, is_robot = list[str](), b"<robot" in content[:4096]
         if is_robot:

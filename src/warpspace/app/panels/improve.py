@@ -146,7 +146,6 @@ class CompensatePanel(AnalysisPanel):
     _picture: tuple[Result, str] | None = None
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
-        """List the options of the chosen format and the machine."""
         if not self.is_ready(state):
             return ()
         kind = find_format(self.values(state)["formats"])
@@ -196,7 +195,6 @@ class CompensatePanel(AnalysisPanel):
         return join(drawn) + details_html(assumptions, "Points, loop, assumptions")
 
     def actions(self, result: Any, *, stale: bool) -> Markup:
-        """Render the buttons: save the table, maps, and the state of the map."""
         state, hint = self.context.state, "Several files are saved as one ZIP file"
         is_applicable = is_applicable_to(state, result.controller)
         disabled = {RESIDUAL} if _is_rounding(result) else set[str]()

@@ -307,7 +307,6 @@ def _frame(state: AppState, tables: machine_edits.Tables, name: str) -> Markup:
 def _boxes(
     command: str, label: str, unit: str, values: Sequence[float], letters: Sequence[str]
 ) -> Markup:
-    """Render a line of number boxes with their letters, for a command of the editor."""
     frame = command.partition(" ")[2]
     boxes: list[Markup] = []
     for index, (value, letter) in enumerate(zip(values, letters, strict=True)):

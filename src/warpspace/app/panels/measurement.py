@@ -43,8 +43,6 @@ WHAT = "CSV file of readings"
 
 @dataclass(frozen=True, slots=True)
 class UploadedFile:
-    """A file uploaded by the page."""
-
     name: str  # never a path
     content: Any = field(repr=False)  # its text, or an object read from it
     description: str = ""  # kind and number of readings
@@ -53,8 +51,6 @@ class UploadedFile:
 
 
 class FilesPanel(AnalysisPanel):
-    """An analysis of uploaded files."""
-
     most_bytes, what = MOST_BYTES, WHAT
 
     def __init__(self, context: Context, entry: Entry) -> None:
@@ -77,7 +73,6 @@ class FilesPanel(AnalysisPanel):
         self.files = files
 
     def files_html(self) -> Markup:
-        """Render the list of files, and the error of the last upload."""
         lines: list[tuple[Markup, Markup]] = []
         for index, file in enumerate(self.files):
             remove = button("✕", f"{self.name}:remove", index, kind="link",
@@ -217,8 +212,6 @@ ESTIMABILITY = (
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrateTexts(Calibrate):
-    """A calibration from uploaded texts."""
-
     files: tuple[UploadedFile, ...] = ()
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> Calibration:

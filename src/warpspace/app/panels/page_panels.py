@@ -120,7 +120,6 @@ class Command:
 
     @property
     def key_label(self) -> str:
-        """The most common key, as displayed."""
         if not self.keys:
             return ""
         *modifiers, key = self.keys[0].split("+")
@@ -161,7 +160,6 @@ COMMANDS = (
 
 
 def key_events() -> Mapping[str, str]:
-    """Return the event and its value for each key."""
     return {key: f"{c.event}={c.value}".rstrip("=") for c in COMMANDS for key in c.keys}
 
 
@@ -305,7 +303,6 @@ class TasksPanel(Panel):
         }
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        """Render the tabs, and an empty place for each section."""
         task = picture.state.page.task
         tabs = join(
             tag(

@@ -102,11 +102,9 @@ class Context:
         self.notes += self.store.apply(update_tab, by=self.mark_changed, at=self.changed_at)
 
     def wake(self) -> None:
-        """Wake the session up."""
         self._wake.set()
 
     def receive(self, message: Events) -> None:
-        """Queue events of the page."""
         events = [event_of(*event) for event in message.events]
         if len([*filter(_is_file, self.events), *filter(_is_file, events)]) > MOST_FILES:
             text = f"More than {MOST_FILES} files at once; select fewer and try again"
@@ -239,15 +237,12 @@ class Section(Panel):
     sentence = ""  # its purpose, shown as a hint of the title
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
-        """Return the inputs of its body."""
         return (id(picture),)
 
     def body(self, picture: LivePicture) -> Markup:
-        """Render the content below the title."""
         raise NotImplementedError
 
     def heading(self, picture: LivePicture) -> str:
-        """Return the title of the unfolded section."""
         return self.title
 
     def is_open(self, state: AppState) -> bool:
@@ -388,13 +383,11 @@ class Jobs:
         return True
 
     def cancel(self) -> None:
-        """Cancel the running job and discard its result."""
         if self._job is not None:
             self._job.set()
             self._end(self._job, None)
 
     def html(self) -> Markup:
-        """Render the name and the progress of the running job."""
         job = self._job
         if job is None:
             return EMPTY

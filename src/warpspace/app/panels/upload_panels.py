@@ -92,8 +92,6 @@ class Import(description.Analysis):
 
 @dataclass(frozen=True, kw_only=True)
 class ImportResult(description.Result):
-    """Errors read from files, and the scene with them."""
-
     files: str
     before: Scene
     reading: registry.Reading
@@ -168,7 +166,6 @@ class ImportPanel(FilesPanel):
         return self._options(state, self.files)
 
     def _options(self, state: AppState, files: Sequence[UploadedFile]) -> Sequence[Option]:
-        """List the options of the format."""
         if not files:
             return ()
         options = {option.name: option for option in self.options()}
@@ -274,7 +271,6 @@ class SceneOverlayPanel(FilesPanel):
     part_fields = ("", "")  # fields of `PartLook`: content and name of the file
 
     def about(self, state: AppState) -> Markup:
-        """Render details and settings of the content."""
         raise NotImplementedError
 
     def result_key(self, state: AppState) -> ResultKey:
@@ -304,8 +300,6 @@ class SceneOverlayPanel(FilesPanel):
         return join((about, self.files_html(), actions(upload)))
 
     def show(self, content: object, name: str, **changes: Any) -> None:
-        """Draw a content, and open the section."""
-
         def update(state: AppState) -> AppState:
             opened = state.page.open | {self.name}
             state = replace(state, page=replace(state.page, task=self.task, open=opened, window=""))
