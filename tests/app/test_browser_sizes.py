@@ -53,8 +53,7 @@ def within(inner, outer):
 def nodes():
     """Nominal corners and drawn nodes of the map, in units of the drawing, [n, 3]."""
     corners = np.stack(np.meshgrid(*PICTURE.grid.bounds_mm.T), axis=-1).reshape(-1, 3)
-    drawn = PICTURE.drawn_mm[::4, ::4, ::4].reshape(-1, 3)
-    return np.concatenate([corners, drawn]) * SCENE_PER_MM
+    return np.concatenate([corners, PICTURE.drawn_mm[::4, ::4, ::4].reshape(-1, 3)]) * SCENE_PER_MM
 
 
 def extent(tab):

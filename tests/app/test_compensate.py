@@ -101,8 +101,7 @@ def test_the_box_has_the_field_of_the_command(name, points, loop, orientation):
 def test_the_machine_may_drift_under_its_table(left, controller):
     drifted = left.with_amplitude("EXX", 7.0).with_amplitude("EA0Z", -12.0)
     grid = build_grid(SCENE.model, SCENE.workspace, 9)
-    shifted = drifted.active_scene()
-    wanted = controller.field(grid.coordinates, grid.nominal_mm, shifted)
+    wanted = controller.field(grid.coordinates, grid.nominal_mm, drifted.active_scene())
     picture = LIVE.evaluate(drifted)
     assert np.abs(picture.field.error_um - wanted.error_um).max() < 1e-9
     assert picture.statistics.max_um > 2.0 * LIVE.evaluate(left).statistics.max_um

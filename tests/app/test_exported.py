@@ -47,8 +47,7 @@ def picture_of(shown, state=BOTH):
 
 def rows_of(picture):
     """Rows of the exported CSV, once their errors are those that are drawn."""
-    text = write_export(picture, ".csv").decode()
-    rows = list(csv.DictReader(StringIO(text)))
+    rows = list(csv.DictReader(StringIO(write_export(picture, ".csv").decode())))
     # three components, whatever loop and frame their columns name
     names = [name for name in rows[0] if re.fullmatch(r"error_.*[xyz]_um", name)]
     errors = np.array([[float(row[name]) for name in names] for row in rows])
@@ -80,8 +79,7 @@ def test_glb_has_the_title_the_factor_and_the_shared_colours(shown):
 
 @pytest.mark.parametrize("shown", WORDS)
 def test_the_offline_page_says_what_it_shows(shown):
-    picture = picture_of(shown)
-    page = build_offline_html(picture)
+    page = build_offline_html(picture_of(shown))
     assert WORDS[shown] in page.partition("<main>")[0]
     errors = page.partition("<aside>")[2]
     assert ("A +6, B 0 µm" in errors) == (shown == "difference")
@@ -116,8 +114,7 @@ def test_glb_has_the_tilts_and_the_range_that_are_coloured(top):
 
 @pytest.mark.render
 def test_the_figure_shows_what_is_coloured_in_the_range_that_is_fixed(renderer):
-    content = draw_figure(tilted(7.0), "", threading.Event())
-    about = Image.open(BytesIO(content)).info
+    about = Image.open(BytesIO(draw_figure(tilted(7.0), "", threading.Event()))).info
     assert about["Title"].startswith("Orientation error of the tool axis")
     said = dict(pair.split("=") for pair in about["Description"].partition(";")[0].split(", "))
     assert (said["figure"], said["range"]) == ("orientation-map", "7")

@@ -76,8 +76,7 @@ def test_curves_that_were_scaled_stay_the_same_functions_of_the_position(state):
 
 def test_the_machine_of_the_scene_comes_back_with_the_errors_of_its_axes(state):
     assert with_own_machine(state) is state
-    changed = with_word(with_word(state, "chain wFXYZt"), "offset X 0 12")
-    back = with_word(changed, "own")
+    back = with_word(with_word(with_word(state, "chain wFXYZt"), "offset X 0 12"), "own")
     assert (back.scene, back.amplitudes, back.tolerances, back.loaded) == (
         state.scene, state.amplitudes, state.tolerances, None
     )  # fmt: skip
@@ -211,8 +210,7 @@ def test_guides_share_the_curve_of_the_axis_and_other_curves_are_said(state):
     pair = with_word(made, "guide Y 1 12")
     assert guides(pair, "Y") == pytest.approx((8.0, 12.0))
     assert pair.curve("ECY").evaluate(np.array([-225.0])) == pytest.approx(0.0)
-    by_direction = Directional(ramp.span, ramp, Ramp(ramp.span, 6.0))
-    for curve in (Constant(ramp.span, 5.0), by_direction):
+    for curve in (Constant(ramp.span, 5.0), Directional(ramp.span, ramp, Ramp(ramp.span, 6.0))):
         other = with_curve(pair, "ECY", curve)
         assert guides(other, "Y") is None
         refused = with_word(other, "guide Y 0 1")
