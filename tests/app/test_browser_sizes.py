@@ -123,9 +123,8 @@ def bars_agree(tab):
 
     def pixels(length_mm):
         ends = [SCENE_PER_MM * (middle + at * length_mm * across) for at in (-0.5, 0.5)]
-        return float(
-            np.linalg.norm(np.subtract(*tab.page.evaluate(PROJECT, np.array(ends).tolist())))
-        )
+        seen = tab.page.evaluate(PROJECT, np.array(ends).tolist())
+        return float(np.linalg.norm(np.subtract(*seen)))
 
     def agree():
         (mm, mm_px, _), (um, um_px, _) = tab.page.evaluate(BARS)

@@ -131,9 +131,8 @@ def test_slices_and_the_tool_point_have_the_table_too(controller):
 
 def test_a_measured_distance_is_that_of_the_points_as_drawn(left):
     ends = {"distance.start": "X=-200,Y=0", "distance.end": "X=200,Y=0"}
-    found, seen, drawn = measure_distance(
-        LIVE.evaluate(replace(left, forms=ends, exaggeration=1.0))
-    )
+    picture = LIVE.evaluate(replace(left, forms=ends, exaggeration=1.0))
+    found, seen, drawn = measure_distance(picture)
     nominal, actual = (float(np.linalg.norm(at[1] - at[0])) for at in (seen, drawn))
     assert found.distance_mm == pytest.approx((nominal, actual), abs=1e-9)
     assert found.difference_um == pytest.approx(1e3 * (actual - nominal), abs=1e-6)
@@ -202,10 +201,8 @@ def test_words_of_others_are_escaped(found, controller):
     worded = replace(controller, label=hostile, notes=(hostile,), assumed=(hostile,))
     given = replace(found, controller=worded)
     left = improve.with_box(START, improve.RESIDUAL, worded)
-    for text in (
-        shown(*asking(), given),
-        build_offline_html(LIVE.evaluate(left)).partition("<iframe")[0],
-    ):
+    page = build_offline_html(LIVE.evaluate(left)).partition("<iframe")[0]
+    for text in (shown(*asking(), given), page):
         assert "<script>" not in text
         assert "&lt;script&gt;" in text
 
@@ -246,9 +243,8 @@ def test_a_point_that_is_asked_about_lies_on_the_drawn_box(left):
     assert np.abs(explained.drawn_um - picture.field.error_um[worst]).max() < 1e-9
     assert np.abs(explained.drawn_mm - picture.drawn_mm[worst]).max() < 1e-6
     # what it is made of are the errors, of which the table is none
-    plain = point_explanation.explain_point(
-        without_table(asked), asked.picked, picture.exaggeration
-    )
+    bare = without_table(asked)
+    plain = point_explanation.explain_point(bare, asked.picked, picture.exaggeration)
     assert np.array_equal(explained.explanation.error_um, plain.explanation.error_um)
     assert np.linalg.norm(plain.drawn_um) > 2.0 * np.linalg.norm(explained.drawn_um)
     assert explained.is_corrected
@@ -291,8 +287,7 @@ def test_nonsense_and_machines_with_nothing_to_correct_give_one_line(name, choic
 def test_a_part_is_cut_with_the_table(left):
     corners = np.array([[x, y, z] for x in (0, 200) for y in (0, 150) for z in (0, 80)], float)
     mesh = Workpiece("box", corners, np.array([[0, 1, 2], [5, 6, 7]], "i4"))
-    cut = [
-        LIVE.evaluate(replace(state, part=PartLook(mesh, "box"))).part for state in (START, left)
-    ]
-    before, after = (np.linalg.norm(one.error_um, axis=1).max() for one in cut)
+    parts = (replace(state, part=PartLook(mesh, "box")) for state in (START, left))
+    cut = [LIVE.evaluate(state).part.error_um for state in parts]
+    before, after = (np.linalg.norm(error_um, axis=1).max() for error_um in cut)
     assert after < 0.1 * before

@@ -118,9 +118,8 @@ def test_what_is_kept_is_bounded_in_memory_and_released_once_it_is_too_old():
         meshes.append(weakref.ref(mesh))
         del store, mesh, look
     gc.collect()
-    assert (
-        1 < sum(mesh() is not None for mesh in meshes) <= tab_keeper.MAX_HISTORY_BYTES // 48_000_000
-    )
+    most = tab_keeper.MAX_HISTORY_BYTES // 48_000_000
+    assert 1 < sum(mesh() is not None for mesh in meshes) <= most
     now[0] = tab_keeper.RETENTION_S + 1.0
     memory.forget()
     gc.collect()
@@ -133,11 +132,7 @@ def test_a_tab_that_is_closed_leaves_only_its_record():
             wire = Wire(socket)
             assert wire.read_until(lambda: wire.is_open, seconds=60.0)
             (session,) = running.sessions
-            left = [
-                weakref.ref(session),
-                weakref.ref(session.context),
-                weakref.ref(session.display),
-            ]
+            left = [*map(weakref.ref, (session, session.context, session.display))]
             end_work(running)
             del session
         end = time.monotonic() + 20.0

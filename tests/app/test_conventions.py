@@ -38,9 +38,8 @@ def test_every_choice_can_be_made_and_measures_its_change(choice):
     assert mean_um == pytest.approx(float((WEIGHTS * length).sum()), abs=1e-9)
     assert max_um == pytest.approx(float(length.max()), abs=1e-9)
     # the loop is no choice of this list: it is that of the drawing
-    assert conventions.effects_of(replace(state, loop=Loop.TOOL))["all"] == pytest.approx(
-        (mean_um, max_um)
-    )
+    in_all = conventions.effects_of(replace(state, loop=Loop.TOOL))["all"]
+    assert in_all == pytest.approx((mean_um, max_um))
     assert conventions.effects_of(replace(START, loop=Loop.RELATIVE))["all"] == (0.0, 0.0)
 
 

@@ -169,9 +169,8 @@ def test_titles_of_machines_are_escaped_and_there_is_a_most():
     part = concepts_part()
     hostile = replace(START, forms={"concepts.machines": f"{design.PRESENT}\n{HOSTILE}"})
     assert HOSTILE not in section(part, hostile)
-    assert not part.is_ready(
-        replace(START, forms={"concepts.machines": f"{design.PRESENT}\nno such"})
-    )
+    unknown = {"concepts.machines": f"{design.PRESENT}\nno such"}
+    assert not part.is_ready(replace(START, forms=unknown))
     many = replace(START, forms={"concepts.machines": "\n".join([design.PRESENT] * 50)})
     assert len(part.chosen(many)) == 8
 
@@ -180,9 +179,8 @@ def test_titles_of_machines_are_escaped_and_there_is_a_most():
 
 
 def test_page_report_and_command_have_one_figure_for_one_question():
-    wanted = warpspace.montecarlo(
-        SCENE, samples=design.SAMPLES, over="max", limit_um=50.0
-    ).probability
+    plan = {"samples": design.SAMPLES, "over": "max", "limit_um": 50.0}
+    wanted = warpspace.montecarlo(SCENE, **plan).probability
     settings = ReportSettings(grid=3, spec_um=50.0, samples=design.SAMPLES)
     (reviewed,) = build_review((SCENE,), settings).scenes
     assert reviewed.results["worst"].points[0].sampled.probability == wanted

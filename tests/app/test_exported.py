@@ -55,17 +55,20 @@ def rows_of(picture):
     return rows
 
 
-@pytest.mark.parametrize("shown", WORDS)
-def test_csv_holds_the_numbers_that_are_drawn(shown):
-    rows = rows_of(picture_of(shown))
+def extras_of(picture):
+    return glb.opened(write_export(picture, ".glb"))[0]["asset"]["extras"]
+
+
+@pytest.mark.parametrize(
+    ("shown", "stem"),
+    [("a", "A_present"), ("b", "B_dvf5000_second"), ("difference", "dvf5000_second_minus_present")],
+)
+def test_every_export_has_what_is_drawn_and_its_title(shown, stem):
+    picture = picture_of(shown)
+    rows = rows_of(picture)
     assert all(title in rows[0]["scene"] for title in WORDS[shown].split(": ", 1)[1].split(" − "))
     assert rows[0]["loop"] == "tool"
-
-
-@pytest.mark.parametrize("shown", WORDS)
-def test_glb_has_the_title_the_factor_and_the_shared_colours(shown):
-    picture = picture_of(shown)
-    extras = glb.opened(write_export(picture, ".glb"))[0]["asset"]["extras"]
+    extras = extras_of(picture)
     assert extras["settings"]["exaggeration"] == picture.exaggeration
     assert extras["colours"]["low"] == picture.scale.low
     assert extras["colours"]["high"] == picture.scale.high
@@ -75,15 +78,18 @@ def test_glb_has_the_title_the_factor_and_the_shared_colours(shown):
     if shown == "difference":
         assert extras["a"]["parameters"]["EXX"]["amplitude"] == 6.0
         assert "parameters" not in extras
-
-
-@pytest.mark.parametrize("shown", WORDS)
-def test_the_offline_page_says_what_it_shows(shown):
-    page = build_offline_html(picture_of(shown))
+    page = build_offline_html(picture)
     assert WORDS[shown] in page.partition("<main>")[0]
     errors = page.partition("<aside>")[2]
     assert ("A +6, B 0 µm" in errors) == (shown == "difference")
     assert ("+6 µm" in errors) == (shown == "a")
+    assert file_stem(picture) == stem
+    assert exported_words(picture).startswith(f"Pictures and exports show {WORDS[shown]}.")
+
+
+def test_a_picture_without_a_comparison_has_the_name_of_its_scene():
+    picture = LIVE.evaluate(START)
+    assert (exported_words(picture), file_stem(picture)) == ("", "dvf5000_first")
 
 
 @pytest.mark.render
@@ -105,7 +111,7 @@ def tilted(top=None):
 @pytest.mark.parametrize("top", [None, 7.0])
 def test_glb_has_the_tilts_and_the_range_that_are_coloured(top):
     picture = tilted(top)
-    extras = glb.opened(write_export(picture, ".glb"))[0]["asset"]["extras"]
+    extras = extras_of(picture)
     assert extras["settings"]["coloured"] == "tool-orientation error"
     assert extras["colours"]["high"] == (picture.scale.high if top is None else top)
     assert extras["colours"]["unit"] == "µrad"
@@ -126,18 +132,6 @@ def test_two_loops_on_one_sheet_are_refused_in_words():
         draw_figure(picture, "", threading.Event())
     # the other exports draw each side through its own
     assert rows_of(picture)[0]["loop"] == "relative − tool"
-
-
-@pytest.mark.parametrize(
-    ("shown", "stem"),
-    [("a", "A_present"), ("b", "B_dvf5000_second"), ("difference", "dvf5000_second_minus_present")],
-)
-def test_files_and_the_panel_name_what_is_exported(shown, stem):
-    picture = picture_of(shown)
-    assert file_stem(picture) == stem
-    assert exported_words(picture).startswith(f"Pictures and exports show {WORDS[shown]}.")
-    assert exported_words(LIVE.evaluate(START)) == ""
-    assert file_stem(LIVE.evaluate(START)) == "dvf5000_first"
 
 
 def test_volumes_that_differ_export_the_side_that_is_drawn():
@@ -174,7 +168,7 @@ def test_conditions_name_what_is_excluded_and_the_range():
 def test_exports_say_the_conditions():
     picture = fixed(without("EA0Z"))
     assert rows_of(picture)[0]["conditions"] == "excluded: EA0Z; range fixed 0–50 µm"
-    extras = glb.opened(write_export(picture, ".glb"))[0]["asset"]["extras"]
+    extras = extras_of(picture)
     assert extras["settings"]["conditions"] == ["excluded: EA0Z", "range fixed 0–50 µm"]
     assert extras["statistics"]["max_at_axes"]["Z"] in (-480.0, -80.0)
     footer = build_offline_html(picture).partition("<footer>")[2]

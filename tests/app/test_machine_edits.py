@@ -32,10 +32,12 @@ from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.scene_writer import scene_to_toml
 
+STATE = start_state(load_scene("dvf5000_first"), nodes=5)
+
 
 @pytest.fixture
 def state():
-    return start_state(load_scene("dvf5000_first"))
+    return start_state(STATE.scene)
 
 
 def guides(state, axis):
@@ -238,8 +240,6 @@ def test_meshes_of_the_scene_are_listed_without_their_folder_and_go(tmp_path):
 
 # --- Where the axes stand, and traces of rotary ones ----------------------------------------------
 
-STATE = start_state(load_scene("dvf5000_first"), nodes=5)
-
 
 def test_every_axis_has_a_slider_whose_event_moves_it():
     moved = put(put(STATE, "positions.B", "-30"), "machine.linear_mm.X", "100")
@@ -374,8 +374,7 @@ def test_a_second_axis_stands_still_and_one_in_place_of_another_spans_the_volume
 
 
 def test_an_axis_moves_along_the_chain_across_the_frame_and_away():
-    names = []
-    scene = PLAIN
+    names, scene = [], PLAIN
     for way in ("right", "right", "left", "left", "left"):
         scene = edit(f"{way} B", scene)
         names.append(str(scene.machine.chain))
@@ -408,15 +407,12 @@ def test_an_offset_moves_the_tool_point_and_a_rotation_turns_what_stands_behind_
     assert edit("rotation S 2 0").machine.fixed_deg == {}
 
 
-def test_a_travel_and_a_direction():
+def test_a_travel_a_direction_and_bodies_that_stay_as_long_as_the_frames_do():
     scene = edit("travel X 1 150 mm")
     assert (scene.machine.axes["X"].travel, scene.workspace) == ((-300.0, 150.0), PLAIN.workspace)
     assert any("reaches beyond the travel" in note for note in scene.notes)
     assert edit("volume Z 0 50").workspace.ranges["Z"] == (50.0, 50.0)
     assert edit("turn B").machine.axes["B"].direction == -1
-
-
-def test_bodies_of_the_library_stay_as_long_as_the_frames_do():
     scene = load_scene("dvf5000_first")
     own = scene.machine.body_dir
     assert own
