@@ -7,6 +7,7 @@ follow them; `AppState.origin` holds those of the scene.
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 from markupsafe import Markup
@@ -138,9 +139,8 @@ def with_own_conventions(state: AppState) -> AppState:
 def effects_of(state: AppState) -> dict[str, Effect]:
     """Compute the effect of each single choice on the map; "all" are those in force."""
     base = with_own_conventions(state)
-    variants = {choice: with_choice(base, choice) for choice in choices(base.scene)} | {
-        "all": state
-    }
+    variants = {choice: with_choice(base, choice) for choice in choices(base.scene)}
+    variants["all"] = state
     if state.scene.reference is not None:
         variants["reference=point"] = with_reference(base, state.scene.reference)
     (weights, before), in_force = _error(base), chosen(base.scene)
@@ -202,9 +202,8 @@ def _changes(scene: Scene) -> dict[str, dict[str, ErrorFunction]]:
             value_in_middle = errors.evaluate_at(row.key, middle, scene.model.direction)
             changes["zero_at"][row.key] = Constant(span, -float(value_in_middle))
             if axis.is_linear and not row.is_rotation and row.direction != axis.index:
-                at = conversion.line_positions(
-                    AxisErrors(scene.model, errors, row.axis, span), row.key
-                )
+                axis_errors = AxisErrors(scene.model, errors, row.axis, span)
+                at = conversion.line_positions(axis_errors, row.key)
                 for line in conversion.ReferenceLine:
                     offset, slope = conversion.fit_line(at, errors.evaluate(row.key, at), line)
                     changes[line][row.key] = Poly(span, (-offset, -slope))
@@ -217,10 +216,8 @@ def _measured_in_the_middle(scene: Scene) -> ErrorSet:
     middle = {axis: np.asarray(at) for axis, at in scene.workspace.positions.items()}
     point = nominal_point(model, Loop.TOOL, middle)
     lines: dict[str, Vector] = {}
-    for frames in (
-        *branch_frames(model, "tool", middle),
-        *branch_frames(model, "workpiece", middle),
-    ):
+    branches = (branch_frames(model, branch, middle) for branch in ("tool", "workpiece"))
+    for frames in chain(*branches):
         if frames.axis.is_linear:
             x, y, z = transforms.apply(transforms.inverse(frames.after), point).tolist()
             lines[frames.axis.name] = (x, y, z)

@@ -320,10 +320,9 @@ class ErrorsPanel(Panel):
         effects = {key: gains.get(key, 0.0) * abs(at) for key, at in state.amplitudes.items()}
         order = tuple(sorted(effects, key=lambda key: -effects[key]))
         largest, used = max(effects.values(), default=0.0) or 1.0, used_keys(state)
-        self._edited = set()
-        ranking = Ranking(inputs, gains, state.amplitudes, order, used, largest, _spans(state))
-        self._ranking = ranking
-        return ranking
+        self._edited, spans = set(), _spans(state)
+        self._ranking = Ranking(inputs, gains, state.amplitudes, order, used, largest, spans)
+        return self._ranking
 
     def _render_rows(
         self, state: AppState, ranking: Ranking, gains: Mapping[str, float]
@@ -356,11 +355,11 @@ class ErrorsPanel(Panel):
             self._feedback = {**self._feedback, key: feedback}
             self.context.call_soon(self.rerender)  # also if the edit is refused
             return state
-        if command in ("sort", "find"):
-            self._ranking = None
         if command == "sort":
+            self._ranking = None
             self.context.call_soon(self.rerender)
         if command == "find":
+            self._ranking = None
             return replace(state, page=replace(state.page, query=value[:LONGEST_QUERY]))
         if command == "row":
             row = value if value in state.amplitudes and value != state.page.row else ""
@@ -473,8 +472,6 @@ _NEAR = 0.75
 def find_parameters(query: str, keys: Sequence[str]) -> tuple[str, ...]:
     parts = fold(query[:LONGEST_QUERY]).split()
     tokens = [part for part in parts if part not in _FILLER] or parts
-    if not tokens:
-        return tuple(keys)
     rows = [parameter(key) for key in keys]
     exact = tuple(row.key for row in rows if all(_fits(token, row) for token in tokens))
     if exact:

@@ -83,10 +83,8 @@ class FilesDialog(JobDialog):
         figures = {"": "map as displayed"}
         figures |= {name: name.replace("-", " ") for name, _ in services.figures}
         kinds = choice("state:set.page.figure", picture.state.page.figure, figures)
-        exports = (
-            button(f"{end[1:].upper()}", "files:export", end, hint=hint)
-            for end, hint in services.exports
-        )
+        exports = (button(end[1:].upper(), "files:export", end, hint=hint)
+                   for end, hint in services.exports)  # fmt: skip
         link = (
             tag("h3", "Link"),
             tag("p", "This server requires a token. A link without the token works only for people"
@@ -137,7 +135,7 @@ class FilesDialog(JobDialog):
             if name.endswith(endings):
                 self.context.send(f"{panel}:file", value)
                 return
-        self._uploads.queue("Opening", partial(self._parse, value))
+        self._uploads.start("Opening", partial(self._parse, value), waits=True)
 
     def _parse(self, value: str, job: Job) -> None:
         name, content = transfers.read_upload(value)

@@ -292,9 +292,8 @@ def _frame(state: AppState, tables: machine_edits.Tables, name: str) -> Markup:
             "turn": "Reverse direction",
             "remove": f"Remove {name}",
         }
-        buttons = [
-            button(text, "editor:do", f"{command} {name}") for command, text in labels.items()
-        ]
+        buttons = [button(text, "editor:do", f"{command} {name}")
+                   for command, text in labels.items()]  # fmt: skip
         if axis.is_linear:
             hint, pressed = "Gantry: two guides with independent errors", gantry is not None
             guides = button("Two guides", "editor:do", f"gantry {name}", hint=hint, pressed=pressed)

@@ -94,7 +94,7 @@ class FilesPanel(AnalysisPanel):
             if not job.is_set():
                 self.context.call_soon(partial(self._accept, accept))
 
-        self._uploads.queue("Reading", work)
+        self._uploads.start("Reading", work, waits=True)
 
     def _accept(self, accept: Callable[[], None]) -> None:
         self._upload_problem = ""

@@ -366,15 +366,11 @@ class Jobs:
     def busy(self) -> bool:
         return self._job is not None
 
-    def queue(self, name: str, work: Callable[[Job], None]) -> None:
-        """Start a job after the present one. For the session."""
-        if not self.start(name, work):
-            self._waiting.append((name, work))
-
-    def start(self, name: str, work: Callable[[Job], None]) -> bool:
-        """Start a job; return False if another one is running. For the session."""
+    def start(self, name: str, work: Callable[[Job], None], *, waits: bool = False) -> bool:
+        """Start a job, now or after a running one; return False if it cannot. For the session."""
         if self._job is not None:
-            return False
+            self._waiting += [(name, work)] if waits else []
+            return waits
         self._job = job = Job(name, self._on_progress)
         self._panel.context.jobs.add(job)
         run = partial(self._run, job, work)

@@ -78,12 +78,10 @@ class Import(description.Analysis):
     sources: tuple[Source, ...] = ()
 
     def run(self, scene: Scene, _watch: description.ProgressCallback, /) -> "ImportResult":
-        axis, names = registry.parse_axis_options(
-            [text for text in re.split(r"[\s,;]+", self.axis) if text]
-        )
-        options = registry.ReadOptions(
-            scene.machine, axis, names, self.sign or "", self.variant or ""
-        )
+        texts = filter(None, re.split(r"[\s,;]+", self.axis))
+        axis, names = registry.parse_axis_options([*texts])
+        sign_and_variant = self.sign or "", self.variant or ""
+        options = registry.ReadOptions(scene.machine, axis, names, *sign_and_variant)
         reading = registry.read_errors(self.sources, options, self.format or "")
         files = ", ".join(source.name for source in self.sources)
         imported = build_imported_scene(reading, scene, scene.title, files)
@@ -172,12 +170,8 @@ class ImportPanel(FilesPanel):
         names = {option.name: option.title for option in registry.formats()}
         recognised = _recognised(files)
         first = recognised.title if recognised is not None else "none, select one"
-        options["format"] = replace(
-            options["format"],
-            choices=tuple(names),
-            choice_labels=names,
-            unset=f"recognised: {first}",
-        )
+        labels = {"choices": tuple(names), "choice_labels": names}
+        options["format"] = replace(options["format"], **labels, unset=f"recognised: {first}")
         chosen = self.values(state).get("format")
         kind = registry.find_format(chosen) if chosen in names else recognised
         if kind is None or kind.tables is None:
@@ -290,10 +284,8 @@ class SceneOverlayPanel(FilesPanel):
             ",".join(IN_BOX[self.name]), kind="" if content else "main",
             hint=f"At most {self.most_bytes >> 20} MB; files can also be dropped on the page",
         )  # fmt: skip
-        missing = (
-            f"{name} is not loaded: links and saved scenes store only its name. Open it again."
-        )
-        about = quiet(missing) if name else EMPTY
+        missing = "is not loaded: links and saved scenes store only its name. Open it again."
+        about = quiet(f"{name} {missing}") if name else EMPTY
         if content:
             remove = button("✕", f"{self.name}:remove", kind="link", aria_label=f"Remove {name}")
             about = tag("p", join((tag("b", name), " ", remove))) + self.about(state)
@@ -396,10 +388,8 @@ class ProgramPanel(SceneOverlayPanel):
 
         *tables, worst = (block for block in result.blocks() if isinstance(block, Table))
         line, *columns = worst.columns
-        columns = (
-            replace(block, shows=block.heading in ("|E|", "largest contributions"))
-            for block in columns
-        )
+        shown = ("|E|", "largest contributions")
+        columns = (replace(column, shows=column.heading in shown) for column in columns)
         narrow = replace(worst, columns=(replace(line, form=link), *columns))
         return block_html(narrow) + details_html((*tables, worst))
 
