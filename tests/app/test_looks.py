@@ -174,14 +174,11 @@ def test_arrows_run_from_foot_to_tip_and_shrink_to_a_point():
     assert (found[:, 2] == 0.0).all()
 
 
-ROOMS = (
-    " 1,2,3,4,5 1,900,700,80,50,-5 1,nan,700,80,50,90 1,50,700,80,50,90 1,9e9,7,8,5,90 ²,9,9,9,9,9"
-)
-
-
-@pytest.mark.parametrize("text", ROOMS.split(" "))
-def test_a_room_that_cannot_be_is_none(text):
-    assert read_room(text) is None
+def test_a_room_that_cannot_be_is_none():
+    texts = (
+        " 1,2,3 1,900,700,80,50,-5 1,nan,700,80,50,90 1,50,700,80,50,90 1,9e9,7,8,5,90 ²,9,9,9,9,9"
+    )
+    assert {*map(read_room, texts.split(" "))} == {None}
 
 
 def test_labels_of_isolines_stand_on_lines_of_their_value():
