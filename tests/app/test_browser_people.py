@@ -162,8 +162,7 @@ def test_a_screen_reader_finds_landmarks_headings_and_names(tab, themes):
         for task, words in TASKS.items():
             tab.task(words)
             tab.page.wait_for_selector(f"#ws-task-{task}[aria-selected=true]")
-            sections = tab.session.display.panels["tasks"].sections[task]
-            for name in sections:
+            for name in tab.session.display.panels["tasks"].sections[task]:
                 if not dark and name not in tab.state.page.open:
                     tab.send("page:fold", name)
                 place = f"[data-piece='section.{name}']"

@@ -13,8 +13,14 @@ from warpspace.app.drawing.colours import colour_levels
 from warpspace.app.drawing.labels import axes, point_labels
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
 from warpspace.app.panels.design import SAMPLES
-from warpspace.app.panels.overlay import HeadPanel, LegendPanel, OrderPanel
-from warpspace.app.panels.toolbar import ComparePanel, ControlsPanel, chosen_map
+from warpspace.app.panels.overlay import (
+    ComparePanel,
+    ControlsPanel,
+    HeadPanel,
+    LegendPanel,
+    OrderPanel,
+    chosen_map,
+)
 from warpspace.app.state.app_state import NOBODY, Side, start_state
 from warpspace.app.state.tree import put
 from warpspace.exceptions import SceneError

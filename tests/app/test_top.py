@@ -11,7 +11,7 @@ from warpspace.app.documents.scene_file import SceneList, open_link
 from warpspace.app.documents.transfers import unpack
 from warpspace.app.panels import top_bar
 from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog
-from warpspace.app.panels.top_bar import COMMANDS, HelpDialog
+from warpspace.app.panels.page_panels import COMMANDS, HelpDialog
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
 from warpspace.scene.library import load_scene

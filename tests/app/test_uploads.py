@@ -6,7 +6,7 @@ import pytest
 
 from app.hostile import upload
 from app.wire import opened
-from warpspace.app.panels import part_panels
+from warpspace.app.panels import upload_panels
 from warpspace.exceptions import OptionError
 from warpspace.resources import scenes_dir
 from warpspace.scene.library import load_scene
@@ -17,7 +17,7 @@ STL = (scenes_dir() / "parts" / "contour.stl").read_bytes()
 @pytest.fixture
 def held(monkeypatch):
     """Have a mesh parsed once an event is set; give that, and the names of the files so far."""
-    go_on, begun, original = threading.Event(), [], part_panels.load_workpiece
+    go_on, begun, original = threading.Event(), [], upload_panels.load_workpiece
 
     def load(name, unit, content):
         begun.append(name)
@@ -26,7 +26,7 @@ def held(monkeypatch):
             raise OptionError("bad.stl: expected triangles")
         return original(name, unit, content)
 
-    monkeypatch.setattr(part_panels, "load_workpiece", load)
+    monkeypatch.setattr(upload_panels, "load_workpiece", load)
     yield go_on, begun
     go_on.set()
 

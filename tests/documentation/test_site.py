@@ -14,9 +14,9 @@ import pytest
 
 import warpspace
 from doc_pages import DOCS, ROOT, anchors, blocks, entries, links, pages, section
+from warpspace.app.panels.page_panels import COMMANDS as KEYS
 from warpspace.app.panels.page_panels import build_panels
 from warpspace.app.panels.panel import Section
-from warpspace.app.panels.top_bar import COMMANDS as KEYS
 from warpspace.app.state.look import TASKS
 from warpspace.cli.main import COMMANDS
 from warpspace.kinematics.model import convention_names

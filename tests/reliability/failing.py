@@ -17,7 +17,7 @@ from warpspace.app.evaluation import live_picture
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.panels.error_list import ErrorsPanel
 from warpspace.app.panels.overlay import HeadPanel, LegendPanel, OrderPanel
-from warpspace.app.panels.top_bar import TopPanel
+from warpspace.app.panels.page_panels import TopPanel
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState

@@ -52,7 +52,7 @@ def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
     scene = scenes[0]
     sampled = montecarlo(MonteCarlo(loop=Loop(settings.loop)).case(scene, SamplingPlan()))
     title = f"Machines within tolerance: {scene.title}"
-    loop = " · ".join((LOOP_WORDS[sampled.view.loop], *placed_words(sampled.case.view)))
+    loop = " · ".join((LOOP_WORDS[sampled.case.view.loop], *placed_words(sampled.case.view)))
     subtitle = (
         f"{loop} · {spell_count(sampled.case.plan.samples)} machines, one random point each ·"
         f" {sampled.case.draws.distribution} over the tolerances · seed {sampled.case.plan.seed}"
