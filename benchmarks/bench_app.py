@@ -39,7 +39,7 @@ from viser.infra import WebsockClientConnection
 from websockets.asyncio.server import ServerConnection
 
 from warpspace.app.browser.page import page_script
-from warpspace.app.browser.viser_private import send_script_to_all
+from warpspace.app.browser.viser_private import send_script
 from warpspace.app.drawing.shapes import light_scene
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.server.session import Session
@@ -200,7 +200,7 @@ class BarePage:
             self.server = viser.ViserServer(host="127.0.0.1", port=8580, verbose=False)
         self.url = f"http://127.0.0.1:{self.server.get_port()}"
         light_scene(self.server.scene)
-        send_script_to_all(self.server, page_script())
+        send_script(self.server, page_script())
         self.server.on_client_connect(lambda client: self.build(client, start, moves))
 
     def build(

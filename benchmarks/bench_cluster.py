@@ -12,8 +12,7 @@ import time
 import warpspace
 from warpspace.analysis.commands.montecarlo import sweep
 from warpspace.analysis.sampling.cases import BLOCK, MOST_BLOCKS, Case, SamplingPlan, sample_blocks
-from warpspace.analysis.sampling.machine_sampling import montecarlo_each
-from warpspace.analysis.sampling.sampling_options import scene_draws
+from warpspace.analysis.sampling.machine_sampling import montecarlo_each, scene_draws
 
 TRILLION = 10**12
 FLEET = 100_000

@@ -8,10 +8,9 @@ from timing import best, in_turns, python
 import warpspace
 from warpspace.analysis.commands.concepts import Concepts, compare_concepts
 from warpspace.analysis.loop_parameters import loop_keys
-from warpspace.analysis.sampling.cases import SamplingPlan, Site, node_gains, reduce_nodes
+from warpspace.analysis.sampling.cases import Case, SamplingPlan, reduce_nodes
 from warpspace.analysis.sampling.distribution import build_draws
 from warpspace.analysis.sampling.machine_sampling import sample_chunks
-from warpspace.field.evaluate import View
 from warpspace.kinematics.model import Loop
 
 MACHINES, NODES = 100_000, 11
@@ -35,8 +34,8 @@ def measure() -> Section:
     scene = warpspace.load_scene("dvf5000_general")
     keys = loop_keys(scene.model, Loop.TOOL, scene.parameter_keys)
     draws = build_draws(scene.tolerances, keys, "uniform")
-    places = Site(scene.model, scene.workspace, Loop.TOOL).spread(NODES)
-    gains = node_gains(scene.model, keys, View(), places)
+    case = Case(scene.model, draws, scene.workspace)
+    gains = case.responses(case.spread(NODES))
     amplitudes = draws.draw(np.random.default_rng(0), MACHINES)
     out = np.empty((4096, gains.shape[2]))
     widths = np.ptp(amplitudes, axis=0) / 2.0

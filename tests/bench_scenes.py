@@ -1,7 +1,11 @@
-"""Scenes for tests of the bench: a machine without errors but those asked for."""
+"""Scenes and readings for tests of bench and calibration: machines with the errors asked for."""
 
 from dataclasses import replace
 
+import numpy as np
+
+from warpspace.calibration.readings import Readings
+from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.errors import Constant, ErrorSet, Ramp
 from warpspace.scene.library import load_scene
 from warpspace.scene.model import Scene
@@ -19,3 +23,25 @@ def scene_with(name: str = "dvf5000_nominal", **errors: object) -> Scene:
         else:
             functions[key] = value
     return replace(scene, errors=ErrorSet(functions))
+
+
+MACHINE = """[machine]
+chain = "wFXYZt"
+[machine.offset_mm]
+t = [0, 0, -300]
+[workspace]
+X = [-100, 300]
+Y = [-100, 100]
+Z = [-200, 0]
+"""
+
+
+def vectors(scene: Scene, poses: dict, error_um: np.ndarray, session: str = "", **more) -> Readings:
+    """Read error vectors, [n, 3], at poses; axes without positions stand at zero."""
+    count = len(error_um)
+    at = {axis: np.asarray(poses.get(axis, np.zeros(count))) for axis in scene.machine.axes}
+    tip, lines = relative_point(scene.model, at), tuple(range(count))
+    readings = Readings(
+        "points", at, tip, 1e-3 * error_um, None, (session,) * count, lines, "r.csv"
+    )
+    return replace(readings, **more)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 
 from warpspace.kinematics.chain import loop_error
 from warpspace.kinematics.model import Loop, Model, convention_names
@@ -55,14 +56,10 @@ def models(draw: st.DrawFn, component_errors: str | None = None) -> Model:
 def positions(
     model: Model, shape: tuple[int, ...] = ()
 ) -> st.SearchStrategy[dict[str, np.ndarray]]:
-    size = int(np.prod(shape))
-
-    def one(axis: str) -> st.SearchStrategy[np.ndarray]:
-        limit = MAX_LINEAR_MM if is_linear(axis) else 180.0
-        values = st.lists(lengths(limit), min_size=size, max_size=size)
-        return values.map(lambda found: np.array(found).reshape(shape))
-
-    return st.fixed_dictionaries({axis: one(axis) for axis in model.machine.axes})
+    limits = {axis: MAX_LINEAR_MM if is_linear(axis) else 180.0 for axis in model.machine.axes}
+    return st.fixed_dictionaries(
+        {axis: hnp.arrays(float, shape, elements=lengths(limit)) for axis, limit in limits.items()}
+    )
 
 
 def central_differences(
@@ -76,10 +73,11 @@ def central_differences(
     steps = STEP * np.eye(len(keys))
 
     def at(sign: float) -> tuple[np.ndarray, np.ndarray]:
-        values = {key: sign * steps[index] for index, key in enumerate(keys)}
+        values = dict(zip(keys, sign * steps, strict=True))
         return loop_error(model, loop, coordinates, values, point_mm)
 
-    (up, up_tilt), (down, down_tilt) = at(1.0), at(-1.0)
-    shape = (len(keys), 3)
-    position = np.broadcast_to((up - down) / (2.0 * STEP), shape)
-    return position, np.broadcast_to((up_tilt - down_tilt) / (2.0 * STEP), shape)
+    position, tilt = (
+        np.broadcast_to((up - down) / (2.0 * STEP), (len(keys), 3))
+        for up, down in zip(at(1.0), at(-1.0), strict=True)
+    )
+    return position, tilt

@@ -38,17 +38,11 @@ hypothesis.settings.load_profile(PROFILE)
 NAMES_A_BROWSER = re.compile(r"\b(browser|page|tab|open_tab)\b")  # as .ci/tests.sh looks for them
 CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 # Software WebGL, the page around it put together without it, and no calls home.
-CHROMIUM_ARGS = (
-    "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--disable-gpu-compositing",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
+CHROMIUM_ARGS = [
+    *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing"),
+    *("--no-sandbox", "--no-first-run", "--disable-quic", "--disable-sync"),
+    *("--disable-background-networking", "--disable-component-update"),
+]
 # In a process of its own, since a machine without OpenGL may end it.
 RENDERER_PROBE = """
 import vtkmodules.vtkRenderingOpenGL2
@@ -90,9 +84,7 @@ def browser(chromium_path: str) -> "Iterator[Browser]":
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(
-            executable_path=chromium_path, args=list(CHROMIUM_ARGS)
-        )
+        chromium = playwright.chromium.launch(executable_path=chromium_path, args=CHROMIUM_ARGS)
         yield chromium
         chromium.close()
 
@@ -109,13 +101,8 @@ def page(browser: "Browser") -> "Iterator[Page]":
 def renderer() -> str:
     """Name of the VTK window class that draws off screen here."""
     try:
-        probe = subprocess.run(
-            [sys.executable, "-c", RENDERER_PROBE],
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
-        )
+        command = [sys.executable, "-c", RENDERER_PROBE]
+        probe = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     except subprocess.TimeoutExpired:
         _unavailable("VTK hangs when it draws off screen")
     if probe.returncode != 0 or not (name := probe.stdout.strip()):
@@ -170,14 +157,12 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
-def pytest_terminal_summary(
-    terminalreporter: pytest.TerminalReporter, config: pytest.Config
-) -> None:
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Say what did not run in time, and why a CI run with skipped tests failed."""
+    config = terminalreporter.config
     if late := config.stash.get(LATE, []):
         terminalreporter.section(f"{len(late)} tests not begun within the time")
-        for node in late:
-            terminalreporter.line(node)
+        terminalreporter.line("\n".join(late))
     if IN_CI and (skipped := _skipped(config)):
         terminalreporter.section("skipped in CI", red=True)
         terminalreporter.line(f"{len(skipped)} skipped, and CI skips nothing: the run fails.")

@@ -15,24 +15,17 @@ def pages() -> list[Path]:
 
 
 def blocks(text: str, language: str) -> list[str]:
-    found = re.findall(
-        rf"^```{re.escape(language)}[^\n]*\n(.*?)^```", text, re.DOTALL | re.MULTILINE
-    )
-    return [str(block) for block in found]
+    return re.findall(rf"(?ms)^```{re.escape(language)}[^\n]*\n(.*?)^```", text)
 
 
 def prose(text: str) -> str:
     return re.sub(r"^(```|:::+).*?^\1", "", text, flags=re.DOTALL | re.MULTILINE)
 
 
-def slug(heading: str) -> str:
-    plain = re.sub(r"[^\w\- ]", "", heading.strip().lower())
-    return plain.replace(" ", "-")
-
-
 def anchors(page: Path) -> set[str]:
     headings = re.findall(r"^#+ (.+)$", prose(page.read_text("utf-8")), re.MULTILINE)
-    return {slug(heading) for heading in headings}
+    plain = (re.sub(r"[^\w\- ]", "", heading.strip().lower()) for heading in headings)
+    return {heading.replace(" ", "-") for heading in plain}
 
 
 def links(page: Path) -> Iterator[tuple[str, str]]:
@@ -52,9 +45,6 @@ def entries(page: Path) -> Iterator[str]:
 
 
 def section(page: Path, heading: str) -> str | None:
-    found = re.search(
-        rf"^#+ {re.escape(heading)}\n(.*?)(?=^#|\Z)",
-        page.read_text("utf-8"),
-        re.DOTALL | re.MULTILINE,
-    )
-    return None if found is None else found.group(1)
+    text = page.read_text("utf-8")
+    match = re.search(rf"(?ms)^#+ {re.escape(heading)}\n(.*?)(?=^#|\Z)", text)
+    return None if match is None else match.group(1)

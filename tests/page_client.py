@@ -11,6 +11,7 @@ import ssl
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -38,7 +39,7 @@ CAMERA = {
     "up_direction": (0.0, 0.0, 1.0),
 }
 """What a page says first, once it is connected: where its camera stands."""
-CALL = re.compile(r"warpspace(\w+\.[\w.]+)\((.*)\);")
+CALL = re.compile(r"^warpspace(\w+\.[\w.]+)\((.*)\);$", re.MULTILINE)
 SLIDER = re.compile(r'data-set="(errors:set\.\w+)"')
 pack = msgspec.msgpack.encode
 
@@ -62,37 +63,30 @@ class Page:
     def __init__(self) -> None:
         self.pieces: dict[str, str] = {}  # HTML by the name of its place
         self.toasts: list[list[str]] = []
-        self.stage = ""
-        self.asked = 0  # how often it was asked whether all is drawn
-        self.pointer: list[Any] = []  # of another tab: which, name, place
-        self.points = ""  # of the surface that is shown, as they are packed
+        self.latest: dict[str, list[Any]] = {}  # values of the latest call of each function
+        self.calls = Counter[str]()  # of each function
+
+    @property
+    def stage(self) -> str:
+        return self.latest.get("Page.stage", [""])[0]
 
     @property
     def sliders(self) -> list[str]:
         return [*dict.fromkeys(SLIDER.findall("".join(self.pieces.values())))]
 
     def take(self, message: dict[str, Any]) -> list[str]:
+        """Note the calls of a message; return the names of the functions."""
         source = message["source"] if message["type"] == "RunJavascriptMessage" else ""
-        calls = [call for line in source.split("\n") if (call := CALL.fullmatch(line))]
-        return [self._take(call[1], json.loads(f"[{call[2]}]")) for call in calls]
-
-    def _take(self, name: str, values: list[Any]) -> str:
-        match name:
-            case "Page.show":
+        names = []
+        for name, arguments in CALL.findall(source):
+            values = self.latest[name] = json.loads(f"[{arguments}]")
+            names.append(name)
+            if name == "Page.show":
                 self.pieces |= values[0]
-            case "Page.toast":
+            elif name == "Page.toast":
                 self.toasts.append(values)
-            case "Page.stage":
-                (self.stage,) = values
-            case "Page.drawn":
-                self.asked += 1
-            case "Page.pointer":
-                self.pointer = values
-            case "Mesh.bend":
-                self.points = values[0]
-            case _:
-                pass
-        return name
+        self.calls.update(names)
+        return names
 
 
 @dataclass(frozen=True)
@@ -232,6 +226,6 @@ class Tab(Page):
     async def _hear(self, message: dict[str, Any]) -> None:
         for name in self.take(message):
             if name == "Mesh.bend":
-                self.seen.append((time.perf_counter(), self.points))
+                self.seen.append((time.perf_counter(), self.latest[name][0]))
             elif name == "Page.drawn":
                 await self.send(said(("tab:drawn", "")))

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from warpspace.analysis.commands.gains import GainsResult
     from warpspace.analysis.commands.montecarlo import MonteCarloResult, sweep
     from warpspace.analysis.registry import Verb
-    from warpspace.analysis.tolerance_check import measured
+    from warpspace.analysis.statistics import measured
     from warpspace.app.documents.notebook import show
     from warpspace.bench.base import run_test
     from warpspace.calibration.calibrate import calibrate
@@ -37,7 +37,7 @@ _HOME = {
     "WarpspaceError": "warpspace.exceptions",
     "evaluate": "warpspace.scene.model",
     "calibrate": "warpspace.calibration.calibrate",
-    "measured": "warpspace.analysis.tolerance_check",
+    "measured": "warpspace.analysis.statistics",
     "run_test": "warpspace.bench.base",
     "show": "warpspace.app.documents.notebook",
     "sweep": "warpspace.analysis.commands.montecarlo",

@@ -11,7 +11,8 @@ from app.page_tab import SCENES, Tab, wait_until_open
 from app.wire import end_work
 from warpspace.app.documents.scene_file import state_to_toml
 from warpspace.app.server.viewer import Viewer
-from warpspace.app.state.app_state import TASKS, start_state
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.look import TASKS
 
 START = start_state(SCENES[0])
 TITLES = ["Deformed volume", "Errors", "Five tasks"]
@@ -161,8 +162,7 @@ def test_a_screen_reader_finds_landmarks_headings_and_names(tab, themes):
         for task, words in TASKS.items():
             tab.task(words)
             tab.page.wait_for_selector(f"#ws-task-{task}[aria-selected=true]")
-            sections = tab.session.display.panels["tasks"].sections[task]
-            for name in sections:
+            for name in tab.session.display.panels["tasks"].sections[task]:
                 if not dark and name not in tab.state.page.open:
                     tab.send("page:fold", name)
                 place = f"[data-piece='section.{name}']"

@@ -53,8 +53,7 @@ def within(inner, outer):
 def nodes():
     """Nominal corners and drawn nodes of the map, in units of the drawing, [n, 3]."""
     corners = np.stack(np.meshgrid(*PICTURE.grid.bounds_mm.T), axis=-1).reshape(-1, 3)
-    drawn = PICTURE.drawn_mm[::4, ::4, ::4].reshape(-1, 3)
-    return np.concatenate([corners, drawn]) * SCENE_PER_MM
+    return np.concatenate([corners, PICTURE.drawn_mm[::4, ::4, ::4].reshape(-1, 3)]) * SCENE_PER_MM
 
 
 def extent(tab):
@@ -124,9 +123,8 @@ def bars_agree(tab):
 
     def pixels(length_mm):
         ends = [SCENE_PER_MM * (middle + at * length_mm * across) for at in (-0.5, 0.5)]
-        return float(
-            np.linalg.norm(np.subtract(*tab.page.evaluate(PROJECT, np.array(ends).tolist())))
-        )
+        seen = tab.page.evaluate(PROJECT, np.array(ends).tolist())
+        return float(np.linalg.norm(np.subtract(*seen)))
 
     def agree():
         (mm, mm_px, _), (um, um_px, _) = tab.page.evaluate(BARS)

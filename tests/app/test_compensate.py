@@ -22,16 +22,9 @@ from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.machine_bodies import tool_point
 from warpspace.app.evaluation.machine_edits import with_changed_scene
 from warpspace.app.evaluation.point_explanation import measure_distance, pick_worst, with_picked
+from warpspace.app.panels import improve
 from warpspace.app.panels.analysis_panel import AnalysisOutcome
 from warpspace.app.panels.conventions import with_reference
-from warpspace.app.panels.improve import (
-    COMPARISON,
-    RESIDUAL,
-    CompensatePanel,
-    is_applicable_to,
-    packed,
-    with_box,
-)
 from warpspace.app.server.tab_keeper import NO_TABLE, page_copy_text, read_page_copy
 from warpspace.app.state.app_state import PartLook, start_state
 from warpspace.app.state.tree import put
@@ -53,7 +46,7 @@ CHOICE = {"formats": "heidenhain", "points": "9"}
 
 def asking(state=START, choice=CHOICE):
     """Give the part, and the state with what was chosen."""
-    part = lone_part(CompensatePanel, "compensate")
+    part = lone_part(improve.CompensatePanel, "compensate")
     part.context.store = SimpleNamespace(state=state)
     return part, replace(state, forms={f"compensate.{key}": one for key, one in choice.items()})
 
@@ -76,7 +69,7 @@ def controller(found):
 @pytest.fixture(scope="module")
 def left(controller):
     """The machine with its table."""
-    return with_box(START, RESIDUAL, controller)
+    return improve.with_box(START, improve.RESIDUAL, controller)
 
 
 @pytest.mark.parametrize(
@@ -97,7 +90,7 @@ def test_the_box_has_the_field_of_the_command(name, points, loop, orientation):
         orientation=orientation,
     )  # fmt: skip
     command = compensate(SCENE, asked, 9)
-    picture = LIVE.evaluate(with_box(START, RESIDUAL, given.controller))
+    picture = LIVE.evaluate(improve.with_box(START, improve.RESIDUAL, given.controller))
     assert picture.state.loop == Loop(command.loop)
     assert np.abs(picture.field.error_um - command.after.error_um).max() < 1e-9
     tilts = picture.field.orientation_urad - command.after.orientation_urad
@@ -108,8 +101,7 @@ def test_the_box_has_the_field_of_the_command(name, points, loop, orientation):
 def test_the_machine_may_drift_under_its_table(left, controller):
     drifted = left.with_amplitude("EXX", 7.0).with_amplitude("EA0Z", -12.0)
     grid = build_grid(SCENE.model, SCENE.workspace, 9)
-    shifted = drifted.active_scene()
-    wanted = controller.field(grid.coordinates, grid.nominal_mm, shifted)
+    wanted = controller.field(grid.coordinates, grid.nominal_mm, drifted.active_scene())
     picture = LIVE.evaluate(drifted)
     assert np.abs(picture.field.error_um - wanted.error_um).max() < 1e-9
     assert picture.statistics.max_um > 2.0 * LIVE.evaluate(left).statistics.max_um
@@ -119,7 +111,7 @@ def test_the_machine_may_drift_under_its_table(left, controller):
 
 
 def test_before_and_after_stand_side_by_side(left, controller):
-    compared = LIVE.evaluate(with_box(START, COMPARISON, controller)).compared
+    compared = LIVE.evaluate(improve.with_box(START, improve.COMPARISON, controller)).compared
     before, after = LIVE.evaluate(START), LIVE.evaluate(left)
     assert (compared.a, compared.b) == (before.statistics, after.statistics)
     assert WITH_TABLE in compared.titles[1]
@@ -128,7 +120,7 @@ def test_before_and_after_stand_side_by_side(left, controller):
 
 def test_slices_and_the_tool_point_have_the_table_too(controller):
     look = replace(START.look, surface="slices")
-    left = with_box(replace(START, look=look), RESIDUAL, controller)
+    left = improve.with_box(replace(START, look=look), improve.RESIDUAL, controller)
     bare, picture = LIVE.evaluate(replace(START, look=look)), LIVE.evaluate(left)
     for plain, cut in zip(bare.slices, picture.slices, strict=True):
         wanted = controller.field(cut.grid.coordinates, cut.grid.nominal_mm)
@@ -139,9 +131,8 @@ def test_slices_and_the_tool_point_have_the_table_too(controller):
 
 def test_a_measured_distance_is_that_of_the_points_as_drawn(left):
     ends = {"distance.start": "X=-200,Y=0", "distance.end": "X=200,Y=0"}
-    found, seen, drawn = measure_distance(
-        LIVE.evaluate(replace(left, forms=ends, exaggeration=1.0))
-    )
+    picture = LIVE.evaluate(replace(left, forms=ends, exaggeration=1.0))
+    found, seen, drawn = measure_distance(picture)
     nominal, actual = (float(np.linalg.norm(at[1] - at[0])) for at in (seen, drawn))
     assert found.distance_mm == pytest.approx((nominal, actual), abs=1e-9)
     assert found.difference_um == pytest.approx(1e3 * (actual - nominal), abs=1e-6)
@@ -165,14 +156,14 @@ def test_what_changes_the_machine_ends_the_table(left, controller):
     machine = replace(SCENE.model.machine, title="another")
     other = replace(SCENE, model=replace(SCENE.model, machine=machine))
     assert with_changed_scene(left, other).controller is None
-    assert is_applicable_to(START, controller)
-    assert not is_applicable_to(start_state(load_scene("fork_head_bc")), controller)
+    assert improve.is_applicable_to(START, controller)
+    assert not improve.is_applicable_to(start_state(load_scene("fork_head_bc")), controller)
     assert left.reset().controller is controller
     assert left.with_amplitude("EXX", 3.0).controller is controller
 
 
 def test_whatever_is_shown_says_which_machine_it_is_of(left, controller):
-    both = with_box(START, COMPARISON, controller)
+    both = improve.with_box(START, improve.COMPARISON, controller)
     picture = LIVE.evaluate(left)
     page = build_offline_html(picture)
     for shown in (subject_words(picture), picture_conditions(picture), page):
@@ -189,7 +180,7 @@ def test_whatever_is_shown_says_which_machine_it_is_of(left, controller):
 
 
 def test_no_file_keeps_the_table_and_a_restored_tab_says_so(controller):
-    both = with_box(START, COMPARISON, controller)
+    both = improve.with_box(START, improve.COMPARISON, controller)
     assert state_to_toml(without_table(both), None) == state_to_toml(START, None)
     restored, _, missing = read_page_copy(page_copy_text(both, None, [SCENE]), [SCENE])
     assert restored.controller is None
@@ -209,11 +200,9 @@ def test_words_of_others_are_escaped(found, controller):
     hostile = "<script>alert(1)</script>"
     worded = replace(controller, label=hostile, notes=(hostile,), assumed=(hostile,))
     given = replace(found, controller=worded)
-    left = with_box(START, RESIDUAL, worded)
-    for text in (
-        shown(*asking(), given),
-        build_offline_html(LIVE.evaluate(left)).partition("<iframe")[0],
-    ):
+    left = improve.with_box(START, improve.RESIDUAL, worded)
+    page = build_offline_html(LIVE.evaluate(left)).partition("<iframe")[0]
+    for text in (shown(*asking(), given), page):
         assert "<script>" not in text
         assert "&lt;script&gt;" in text
 
@@ -231,7 +220,7 @@ def test_a_table_is_saved_whole_and_the_box_then_shows_before_and_after(found):
     assert zipfile.ZipFile(io.BytesIO(content)).namelist() == [
         f"compensation{add or found.format.endings[0]}" for add in found.files
     ]
-    assert packed(found) == (name, content)  # the same table gives the same bytes
+    assert improve.packed(found) == (name, content)  # the same table gives the same bytes
     assert part.handle(after, "box", "machine").controller is None
     assert part.handle(state, "box", "<b>") == state
     assert part.handle(state, "set.formats", "<b>").forms["compensate.formats"] == "<b>"
@@ -254,9 +243,8 @@ def test_a_point_that_is_asked_about_lies_on_the_drawn_box(left):
     assert np.abs(explained.drawn_um - picture.field.error_um[worst]).max() < 1e-9
     assert np.abs(explained.drawn_mm - picture.drawn_mm[worst]).max() < 1e-6
     # what it is made of are the errors, of which the table is none
-    plain = point_explanation.explain_point(
-        without_table(asked), asked.picked, picture.exaggeration
-    )
+    bare = without_table(asked)
+    plain = point_explanation.explain_point(bare, asked.picked, picture.exaggeration)
     assert np.array_equal(explained.explanation.error_um, plain.explanation.error_um)
     assert np.linalg.norm(plain.drawn_um) > 2.0 * np.linalg.norm(explained.drawn_um)
     assert explained.is_corrected
@@ -273,7 +261,7 @@ def test_maps_are_drawn_beside_the_page(found):
 def test_machines_with_few_moving_axes_have_box_and_maps_too(name):
     state = start_state(still_scene(name))
     given = computed(state, {**CHOICE, "points": "5"})
-    picture = LIVE.evaluate(with_box(state, COMPARISON, given.controller))
+    picture = LIVE.evaluate(improve.with_box(state, improve.COMPARISON, given.controller))
     assert picture.compared.b.max_um <= picture.compared.a.max_um
     for narrow in (True, False):
         assert compensation_maps(given, False, narrow).axes
@@ -299,8 +287,7 @@ def test_nonsense_and_machines_with_nothing_to_correct_give_one_line(name, choic
 def test_a_part_is_cut_with_the_table(left):
     corners = np.array([[x, y, z] for x in (0, 200) for y in (0, 150) for z in (0, 80)], float)
     mesh = Workpiece("box", corners, np.array([[0, 1, 2], [5, 6, 7]], "i4"))
-    cut = [
-        LIVE.evaluate(replace(state, part=PartLook(mesh, "box"))).part for state in (START, left)
-    ]
-    before, after = (np.linalg.norm(one.error_um, axis=1).max() for one in cut)
+    parts = (replace(state, part=PartLook(mesh, "box")) for state in (START, left))
+    cut = [LIVE.evaluate(state).part.error_um for state in parts]
+    before, after = (np.linalg.norm(error_um, axis=1).max() for error_um in cut)
     assert after < 0.1 * before

@@ -17,16 +17,7 @@ import pytest
 from app.wire import Wire, dial, end_work
 from warpspace.app.browser.incoming import LONGEST_VALUE, Events
 from warpspace.app.panels.panel import MOST_FILES, Context
-from warpspace.app.server import viewer
-from warpspace.app.server.tab_keeper import (
-    MAX_CLOSED_TABS,
-    MAX_HISTORY_BYTES,
-    RETENTION_S,
-    TabMemory,
-    TabRecord,
-    is_token,
-    new_token,
-)
+from warpspace.app.server import tab_keeper, viewer
 from warpspace.app.server.viewer import free_port, is_local, page_url, resolve_host
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
@@ -78,7 +69,7 @@ def test_public_tunnel_is_off_and_a_second_app_takes_another_port():
 
 def test_a_connection_that_is_gone_takes_nothing_from_the_tab_that_comes_back():
     scene = load_scene("dvf5000_nominal")
-    token, left = new_token(), TabRecord(StateStore(start_state(scene)), None)
+    token, left = tab_keeper.new_token(), tab_keeper.TabRecord(StateStore(start_state(scene)), None)
     gone: Any = SimpleNamespace(token="")
     with viewer.Viewer(scene) as running:
         running.memory.keep(token, left)
@@ -87,10 +78,10 @@ def test_a_connection_that_is_gone_takes_nothing_from_the_tab_that_comes_back():
 
 
 def test_a_page_says_once_which_tab_it_is():
-    token = new_token()
+    token = tab_keeper.new_token()
     with viewer.Viewer(load_scene("dvf5000_nominal")) as running, dial(running) as socket:
         wire = Wire(socket, token)
-        wire.say("tab:here", new_token())  # only the first counts
+        wire.say("tab:here", tab_keeper.new_token())  # only the first counts
         assert wire.read_until(lambda: wire.is_open, seconds=60.0)
         (session,) = running.sessions
         assert session.token == token
@@ -102,33 +93,34 @@ STATE = start_state(load_scene("dvf5000_first"))
 
 def test_what_is_kept_is_bounded_in_time_and_number():
     now = [0.0]
-    memory = TabMemory(clock=lambda: now[0])
-    tokens = [new_token() for _ in range(MAX_CLOSED_TABS + 10)]
+    memory = tab_keeper.TabMemory(clock=lambda: now[0])
+    tokens = [tab_keeper.new_token() for _ in range(tab_keeper.MAX_CLOSED_TABS + 10)]
     for token in tokens:
-        memory.keep(token, TabRecord(StateStore(STATE), None))
-    assert len(memory) == MAX_CLOSED_TABS
+        memory.keep(token, tab_keeper.TabRecord(StateStore(STATE), None))
+    assert len(memory) == tab_keeper.MAX_CLOSED_TABS
     assert memory.take(tokens[0]) is None
     assert memory.take(tokens[-2]) is not None
     assert memory.take(tokens[-2]) is None  # given back once
-    now[0] = RETENTION_S + 1.0
+    now[0] = tab_keeper.RETENTION_S + 1.0
     assert memory.take(tokens[-1]) is None
     assert len(memory) == 0
 
 
 def test_what_is_kept_is_bounded_in_memory_and_released_once_it_is_too_old():
     now, meshes = [0.0], []
-    memory = TabMemory(clock=lambda: now[0])
-    for _ in range(MAX_HISTORY_BYTES // 48_000_000 + 4):
+    memory = tab_keeper.TabMemory(clock=lambda: now[0])
+    for _ in range(tab_keeper.MAX_HISTORY_BYTES // 48_000_000 + 4):
         store = StateStore(STATE)
         mesh = Workpiece("x", np.zeros((2_000_000, 3)), np.zeros((1, 3), "i4"))
         look = replace(STATE.part, mesh=mesh)
         store.apply(lambda state, look=look: replace(state, part=look))
-        memory.keep(new_token(), TabRecord(store, None))
+        memory.keep(tab_keeper.new_token(), tab_keeper.TabRecord(store, None))
         meshes.append(weakref.ref(mesh))
         del store, mesh, look
     gc.collect()
-    assert 1 < sum(mesh() is not None for mesh in meshes) <= MAX_HISTORY_BYTES // 48_000_000
-    now[0] = RETENTION_S + 1.0
+    most = tab_keeper.MAX_HISTORY_BYTES // 48_000_000
+    assert 1 < sum(mesh() is not None for mesh in meshes) <= most
+    now[0] = tab_keeper.RETENTION_S + 1.0
     memory.forget()
     gc.collect()
     assert not any(mesh() for mesh in meshes)
@@ -140,11 +132,7 @@ def test_a_tab_that_is_closed_leaves_only_its_record():
             wire = Wire(socket)
             assert wire.read_until(lambda: wire.is_open, seconds=60.0)
             (session,) = running.sessions
-            left = [
-                weakref.ref(session),
-                weakref.ref(session.context),
-                weakref.ref(session.display),
-            ]
+            left = [*map(weakref.ref, (session, session.context, session.display))]
             end_work(running)
             del session
         end = time.monotonic() + 20.0
@@ -158,7 +146,7 @@ def test_a_tab_that_is_closed_leaves_only_its_record():
     "text", ["", "abc", "x" * 32, "0" * 33, "A" * 32, "../" * 10, "<script>", "0" * 31 + "\n"]
 )
 def test_what_is_no_token_is_refused(text):
-    assert not is_token(text)
+    assert tab_keeper.TAB_TOKEN.fullmatch(text) is None
 
 
 def test_only_so_many_files_wait_at_once():

@@ -10,17 +10,7 @@ from warpspace.analysis.commands.adjust import apply_adjustments
 from warpspace.app.documents.legend import order_conditions, picture_conditions, subject_words
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.live_model import LiveModel
-from warpspace.app.panels.conventions import (
-    ConventionsSection,
-    choices,
-    chosen,
-    convention_costs,
-    effects_of,
-    with_choice,
-    with_own_conventions,
-    with_reference,
-    with_travel,
-)
+from warpspace.app.panels import conventions
 from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.tree import put
 from warpspace.field.evaluate import View
@@ -38,22 +28,23 @@ START = start_state(load_scene("dvf5000_first"), nodes=7)
 WEIGHTS = LIVE.evaluate(START).grid.weights
 
 
-@pytest.mark.parametrize("choice", choices(START.scene))
+@pytest.mark.parametrize("choice", conventions.choices(START.scene))
 def test_every_choice_can_be_made_and_measures_its_change(choice):
-    state = with_choice(START, choice)
-    assert choice in chosen(state.scene)
-    mean_um, max_um = effects_of(START)[choice]
+    state = conventions.with_choice(START, choice)
+    assert choice in conventions.chosen(state.scene)
+    mean_um, max_um = conventions.effects_of(START)[choice]
     change = LIVE.evaluate(state).field.error_um - LIVE.evaluate(START).field.error_um
     length = np.linalg.norm(change, axis=-1)
     assert mean_um == pytest.approx(float((WEIGHTS * length).sum()), abs=1e-9)
     assert max_um == pytest.approx(float(length.max()), abs=1e-9)
     # the loop is no choice of this list: it is that of the drawing
-    assert effects_of(replace(state, loop=Loop.TOOL))["all"] == pytest.approx((mean_um, max_um))
-    assert effects_of(replace(START, loop=Loop.RELATIVE))["all"] == (0.0, 0.0)
+    in_all = conventions.effects_of(replace(state, loop=Loop.TOOL))["all"]
+    assert in_all == pytest.approx((mean_um, max_um))
+    assert conventions.effects_of(replace(START, loop=Loop.RELATIVE))["all"] == (0.0, 0.0)
 
 
 def test_the_section_offers_what_is_in_force_and_holds_the_point_that_is_picked():
-    section = lone_part(ConventionsSection)
+    section = lone_part(conventions.ConventionsSection)
     text = section.body(LIVE.evaluate(START))
     assert 'value="component_errors=after_motion" checked' in text
     assert "before motion" in text
@@ -72,18 +63,18 @@ def test_the_section_offers_what_is_in_force_and_holds_the_point_that_is_picked(
 
 
 def test_a_reference_is_held_still_clamped_and_taken_back():
-    state = with_reference(START, {"X": 0.0, "Y": 0.0, "Z": -280.0})
+    state = conventions.with_reference(START, {"X": 0.0, "Y": 0.0, "Z": -280.0})
     picture = LIVE.evaluate(state)
     assert np.abs(picture.field.error_um[3, 3, 3]).max() < 1e-9
-    assert with_own_conventions(state) == START
-    wild = with_reference(START, {"X": 1e9, "Y": float("nan")})
+    assert conventions.with_own_conventions(state) == START
+    wild = conventions.with_reference(START, {"X": 1e9, "Y": float("nan")})
     assert wild.scene.reference["X"] == 275.0
     assert wild.scene.reference["Y"] == 0.0
     assert len(wild.notes) == 2
 
 
 def test_lines_stay_on_the_outside_of_a_mirrored_volume():
-    picture = LIVE.evaluate(with_choice(START.zeroed(), "direction X=-1"))
+    picture = LIVE.evaluate(conventions.with_choice(START.zeroed(), "direction X=-1"))
     lines, nodes = edge_pieces(picture).reshape(-1, 3), picture.grid.nominal_mm.reshape(-1, 3)
     assert (lines.max(axis=0) > nodes.max(axis=0)).all()
     assert (lines.min(axis=0) < nodes.min(axis=0)).all()
@@ -113,7 +104,7 @@ TWO = start_state(TWO_WAYS, nodes=5)
 
 @pytest.mark.parametrize("way", TravelDirection)
 def test_the_box_the_heading_and_files_have_the_direction(way):
-    state = with_travel(TWO, way)
+    state = conventions.with_travel(TWO, way)
     picture = LIVE.evaluate(state)
     words = "reversal" if way == "difference" else {"mean": "mean of both"}.get(way, way)
     assert any(words in said for said in subject_words(picture))
@@ -122,7 +113,7 @@ def test_the_box_the_heading_and_files_have_the_direction(way):
     assert picture.field.error_um[-1, 0, 0, 1] == pytest.approx(at_end[way])
     back, _ = open_text(state_to_toml(state), "two_ways", "x.toml")
     assert back.scene.model.direction == way
-    assert with_own_conventions(state).scene == TWO_WAYS
+    assert conventions.with_own_conventions(state).scene == TWO_WAYS
 
 
 def test_readings_and_uncertainties_are_saved_with_what_is_changed():
@@ -185,7 +176,7 @@ VOLUME = Workspace({"X": SPAN, "Y": (0.0, 0.0), "Z": (0.0, 0.0)})
 def test_costs_by_hand(key, curve, cost, free):
     machine = build_machine("wFXYZt", offset_mm={"t": (0.0, 0.0, -300.0)})
     scene = Scene("own", "", Model(machine), VOLUME, ErrorSet({key: curve}))
-    found = convention_costs(scene, View())
+    found = conventions.convention_costs(scene, View())
     largest = 2.0 if key == "EYX" else 1.0  # a tilt about the middle is largest at the ends
     for name, mean in cost.items():
         assert found[name] == pytest.approx((mean, largest * mean))

@@ -11,16 +11,7 @@ from warpspace import load_scene
 from warpspace.analysis.commands.adjust import Adjust
 from warpspace.analysis.commands.concepts import Concepts, compare_concepts
 from warpspace.app.documents.output_services import Services
-from warpspace.app.panels.design import (
-    PRESENT,
-    SAMPLES,
-    ConceptsPanel,
-    TolerancesPanel,
-    estimate,
-    percent,
-    sample_machines,
-    tolerance_shares,
-)
+from warpspace.app.panels import design
 from warpspace.app.panels.improve import AdjustPanel
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import Specification, start_state
@@ -83,38 +74,40 @@ def state_of(scene, loop=Loop.TOOL, limit_um=60.0, **wanted):
     ],
 )
 def test_a_probability_is_that_of_the_command(loop, over, distribution):
-    ensemble = sample_machines(state_of(SCENE, loop, over=over, distribution=distribution))
-    live, kept = estimate(ensemble, SCENE.tolerances, 60.0)
+    ensemble = design.sample_machines(state_of(SCENE, loop, over=over, distribution=distribution))
+    live, kept = design.estimate(ensemble, SCENE.tolerances, 60.0)
     asked = {"loop": loop, "over": over, "distribution": distribution}
-    found = warpspace.montecarlo(SCENE, samples=SAMPLES, limit_um=60.0, **asked)
+    found = warpspace.montecarlo(SCENE, samples=design.SAMPLES, limit_um=60.0, **asked)
     assert live.mean_um == pytest.approx(found.mean_um, rel=1e-6)
     assert live.quantile(0.95) == pytest.approx(found.p95_um, rel=1e-6)
     assert kept.probability == pytest.approx(found.probability.probability, abs=1e-4)
-    assert sum(tolerance_shares(ensemble, SCENE.tolerances).values()) == pytest.approx(1.0)
+    assert sum(design.tolerance_shares(ensemble, SCENE.tolerances).values()) == pytest.approx(1.0)
 
 
 def test_the_worst_point_of_the_workpiece_loop_is_refused_with_a_way_out():
-    part = lone_part(TolerancesPanel, "allocate")
+    part = lone_part(design.TolerancesPanel, "allocate")
     shown = section(part, state_of(PROPOSED, Loop.WORKPIECE))
     assert "montecarlo --over max" in shown
     assert "Evaluated at" in shown
 
 
 def test_an_allocation_reaches_what_was_wanted_and_is_one_change():
-    part = lone_part(TolerancesPanel, "allocate")
+    part = lone_part(design.TolerancesPanel, "allocate")
     fixed = frozenset({"EA0Z", "EXA"})  # the latter of another machine
     state = state_of(FIRST, limit_um=40.0, percent=98.0, fixed=fixed, costs="EB0Z=9,EYA=3")
     ran(part, state)
     (update,) = part.context.posted
     after = update(state)
     # the machines of the page are those of the allocation, and the lower end of the interval counts
-    (_, shown) = estimate(sample_machines(state), after.tolerances, 40.0)
+    (_, shown) = design.estimate(design.sample_machines(state), after.tolerances, 40.0)
     found = part.outcome.result
     assert shown == found.after
     assert 0.98 <= shown.low < 0.983
     assert edits.half_width_of(after, "EA0Z") == 25.0
     assert edits.half_width_of(after, "EB0Z") > 1.3 * edits.half_width_of(after, "EC0Y")
-    assert f'<span class="ws-pass">{percent(shown.probability)} %</span>' in section(part, after)
+    assert f'<span class="ws-pass">{design.percent(shown.probability)} %</span>' in section(
+        part, after
+    )
     assert f"{100.0 * found.after.probability:.2f} % of the machines" in section(part, after)
     assert "Applied" in section(part, after)
     # what was changed meanwhile is not overwritten; errors are none of its inputs
@@ -125,7 +118,7 @@ def test_an_allocation_reaches_what_was_wanted_and_is_one_change():
 
 
 def test_tolerances_are_typed_fixed_scaled_and_reset():
-    part = lone_part(TolerancesPanel, "allocate")
+    part = lone_part(design.TolerancesPanel, "allocate")
     section(part, START)  # lays out the rows
     state = put(START, "specification.fixed", "+EXX")
     assert 'data-value="-EXX"' in section(part, state)
@@ -144,7 +137,7 @@ def test_tolerances_are_typed_fixed_scaled_and_reset():
 
 
 def concepts_part():
-    part = lone_part(ConceptsPanel, "concepts")
+    part = lone_part(design.ConceptsPanel, "concepts")
     part.context.scenes = {"other": OTHER, HOSTILE: replace(OTHER, title=HOSTILE)}
     return part
 
@@ -156,10 +149,10 @@ def test_machines_are_compared_as_the_command_does_and_drawn():
     key = next(key for key, scene in part.offers(START).items() if scene == OTHER)
     assert part.handle(START, "run", "") is START  # one machine alone is not compared
     chosen = part.handle(part.handle(START, "set.add", key), "set.add", key)
-    assert part.chosen(chosen) == [PRESENT, key]
+    assert part.chosen(chosen) == [design.PRESENT, key]
     ran(part, chosen)
     found = part.outcome.result
-    plan = Concepts(limit_um=chosen.specification.limit_um, samples=SAMPLES)
+    plan = Concepts(limit_um=chosen.specification.limit_um, samples=design.SAMPLES)
     expected = compare_concepts([FIRST, OTHER], plan)
     assert [one.json_fields for one in found.concepts] == [one.json_fields for one in expected]
     assert "largest contributions share of the variance" in section(part, chosen)
@@ -167,17 +160,18 @@ def test_machines_are_compared_as_the_command_does_and_drawn():
     wait(part)
     assert [one.title for one in asked[0]] == [FIRST.title, OTHER.title]
     assert ("concepts.png", b"") in part.context.told
-    assert part.chosen(part.handle(chosen, "remove", PRESENT)) == [key]
+    assert part.chosen(part.handle(chosen, "remove", design.PRESENT)) == [key]
     for word in ("set.add", "remove", "open"):
         assert part.handle(chosen, word, "none of them") == chosen
 
 
 def test_titles_of_machines_are_escaped_and_there_is_a_most():
     part = concepts_part()
-    hostile = replace(START, forms={"concepts.machines": f"{PRESENT}\n{HOSTILE}"})
+    hostile = replace(START, forms={"concepts.machines": f"{design.PRESENT}\n{HOSTILE}"})
     assert HOSTILE not in section(part, hostile)
-    assert not part.is_ready(replace(START, forms={"concepts.machines": f"{PRESENT}\nno such"}))
-    many = replace(START, forms={"concepts.machines": "\n".join([PRESENT] * 50)})
+    unknown = {"concepts.machines": f"{design.PRESENT}\nno such"}
+    assert not part.is_ready(replace(START, forms=unknown))
+    many = replace(START, forms={"concepts.machines": "\n".join([design.PRESENT] * 50)})
     assert len(part.chosen(many)) == 8
 
 
@@ -185,12 +179,13 @@ def test_titles_of_machines_are_escaped_and_there_is_a_most():
 
 
 def test_page_report_and_command_have_one_figure_for_one_question():
-    wanted = warpspace.montecarlo(SCENE, samples=SAMPLES, over="max", limit_um=50.0).probability
-    settings = ReportSettings(grid=3, spec_um=50.0, samples=SAMPLES)
+    plan = {"samples": design.SAMPLES, "over": "max", "limit_um": 50.0}
+    wanted = warpspace.montecarlo(SCENE, **plan).probability
+    settings = ReportSettings(grid=3, spec_um=50.0, samples=design.SAMPLES)
     (reviewed,) = build_review((SCENE,), settings).scenes
     assert reviewed.results["worst"].points[0].sampled.probability == wanted
     asked = state_of(SCENE, limit_um=50.0)
-    assert answer_of(lone_part(TolerancesPanel, "allocate"), asked).before == wanted
+    assert answer_of(lone_part(design.TolerancesPanel, "allocate"), asked).before == wanted
     forms = {"concepts.loop": "tool", "concepts.own_tolerances": "1"}
     (found,) = answer_of(concepts_part(), replace(asked, forms=forms)).concepts
     assert found.sampled.probability == wanted

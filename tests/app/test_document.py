@@ -10,6 +10,7 @@ from urllib.parse import parse_qsl, urlencode
 import pytest
 
 from app.hostile import upload
+from warpspace.app.documents import transfers
 from warpspace.app.documents.scene_file import (
     MOST_OPENED,
     PREFIX,
@@ -24,22 +25,8 @@ from warpspace.app.documents.scene_file import (
     state_to_toml,
     with_settings,
 )
-from warpspace.app.documents.transfers import (
-    pack,
-    read_upload,
-    safe_file_name,
-    safe_name,
-    unpack,
-    upload_text,
-)
 from warpspace.app.drawing.camera import CameraMemory
-from warpspace.app.evaluation.compare import (
-    pinned_side,
-    scene_side,
-    with_pin,
-    with_proposal,
-    with_sides,
-)
+from warpspace.app.evaluation import compare
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.panels.conventions import with_choice, with_reference
 from warpspace.app.server.tab_keeper import (
@@ -66,9 +53,11 @@ CAMERA = CameraMemory((10.0, -20.0, 12.0), (0.0, 0.5, 1.5), (0.0, 0.0, 1.0), 0.3
 def test_conventions_curves_camera_and_what_is_compared_come_back_identical(way):
     # what no other machine knows by name is stored with its content
     curve = TableCurve((-275.0, 275.0), ((-275.0, 0.0), (0.0, 8.0), (275.0, -2.0)))
-    pinned = with_pin(with_choice(edits.with_curve(START, "EXX", curve), "direction C=-1"))
+    pinned = compare.with_pin(with_choice(edits.with_curve(START, "EXX", curve), "direction C=-1"))
     opened = replace(SECOND, name="shop floor", title="Shop floor, machine 7")
-    compared = with_sides(pinned, scene_side(opened), pinned.comparison.a).comparison
+    compared = compare.with_sides(
+        pinned, compare.scene_side(opened), pinned.comparison.a
+    ).comparison
     state = with_reference(with_choice(START, "component_errors=before_motion"), {"X": 5.0})
     state = edits.with_curve(state, "EYY", Ramp(state.axis_span("EYY"), 2.5))
     state = replace(state.without_notes(), comparison=replace(compared, shown="difference"))
@@ -91,7 +80,7 @@ def test_conventions_curves_camera_and_what_is_compared_come_back_identical(way)
 
 
 def test_a_proposal_that_is_looked_at_comes_back():
-    state = with_proposal(START, with_reference(START, {"X": 5.0}).scene, "Repaired")
+    state = compare.with_proposal(START, with_reference(START, {"X": 5.0}).scene, "Repaired")
     back, _ = open_text(state_to_toml(state), "x", "x.toml")
     assert back.comparison.b.state.scene.reference == state.comparison.b.state.scene.reference
     titles = LiveModel().evaluate(replace(back, nodes=5)).compared.titles
@@ -120,7 +109,7 @@ def test_a_link_to_a_known_scene_is_short_and_readable():
     back, camera = open_link(link, [FIRST])
     assert back == START.with_amplitude("EXX", 2.5)
     assert camera is None
-    link = state_to_link(with_sides(START, Side(), scene_side(SECOND)), None, KNOWN)
+    link = state_to_link(compare.with_sides(START, Side(), compare.scene_side(SECOND)), None, KNOWN)
     assert link == "scene=dvf5000_first&compare.b=scene%3Ddvf5000_second"
 
 
@@ -171,18 +160,18 @@ def test_cameras_that_see_nothing_are_not_taken(numbers):
 @pytest.mark.parametrize(
     ("safe", "given", "kept"),
     [
-        (safe_name, "../../etc/passwd", "passwd"),
-        (safe_name, "..\\..\\evil.toml", "evil"),
-        (safe_name, "a<script>.toml", "a_script"),
-        (safe_name, "", "scene"),
-        (safe_name, "\x00\n", "scene"),
-        (safe_name, "x" * 300, "x" * 60),
-        (safe_name, "my machine.v2.toml", "my machine.v2"),
+        (transfers.safe_name, "../../etc/passwd", "passwd"),
+        (transfers.safe_name, "..\\..\\evil.toml", "evil"),
+        (transfers.safe_name, "a<script>.toml", "a_script"),
+        (transfers.safe_name, "", "scene"),
+        (transfers.safe_name, "\x00\n", "scene"),
+        (transfers.safe_name, "x" * 300, "x" * 60),
+        (transfers.safe_name, "my machine.v2.toml", "my machine.v2"),
         # those of received data keep their ending
-        (safe_file_name, "a b.CSV", "a b.CSV"),
-        (safe_file_name, "../../<img src=x>.csv", "img src_x.csv"),
-        (safe_file_name, "noending", "noending.txt"),
-        (safe_file_name, ".", "file.txt"),
+        (transfers.safe_file_name, "a b.CSV", "a b.CSV"),
+        (transfers.safe_file_name, "../../<img src=x>.csv", "img src_x.csv"),
+        (transfers.safe_file_name, "noending", "noending.txt"),
+        (transfers.safe_file_name, ".", "file.txt"),
     ],
 )
 def test_names_from_a_browser_are_made_safe(safe, given, kept):
@@ -191,9 +180,9 @@ def test_names_from_a_browser_are_made_safe(safe, given, kept):
 
 def test_uploads_that_are_no_scene_are_refused_with_every_problem():
     with pytest.raises(OptionError, match="at most 4 MB"):
-        read_upload(upload("big.toml", b"x" * (4 * 2**20 + 1))[1])
+        transfers.read_upload(upload("big.toml", b"x" * (4 * 2**20 + 1))[1])
     with pytest.raises(OptionError, match="not UTF-8"):
-        upload_text(b"\xff\xfe\x00", "x.toml")
+        transfers.upload_text(b"\xff\xfe\x00", "x.toml")
     with pytest.raises(SceneError) as caught:
         open_text('machine = "dvf5001"\nsurprise = 1\n[errors]\nEC0X = "a"\n', "x", "x.toml")
     assert len(caught.value.problems) >= 3
@@ -207,7 +196,7 @@ def edited():
     "state",
     [
         edited(),
-        with_pin(edited()).with_amplitude("EXX", 1.0),
+        compare.with_pin(edited()).with_amplitude("EXX", 1.0),
         edits.with_curve(
             edited(), "EYX", TableCurve((-275.0, 275.0), ((-275.0, 1.0), (0.0, -3.0)))
         ),
@@ -235,7 +224,7 @@ def test_scene_that_the_server_has_no_more_comes_back_from_its_file():
 
 
 def test_comparison_that_is_too_large_is_left_out_and_named(monkeypatch):
-    state = with_pin(edited()).with_amplitude("EXX", 1.0)
+    state = compare.with_pin(edited()).with_amplitude("EXX", 1.0)
     alone = page_copy_text(START.with_amplitude("EXX", 1.0), None, KNOWN)
     monkeypatch.setattr("warpspace.app.server.tab_keeper.MAX_KEPT_TEXT", len(alone) + 300)
     found, _, missing = read_page_copy(page_copy_text(state, None, KNOWN), KNOWN)
@@ -281,8 +270,8 @@ def test_titles_are_unique_and_never_words_of_the_page():
 
 
 KNOWN_SCENES = (*KNOWN, load_scene("teach_tilted_c"))
-PINNED = pinned_side(START.with_amplitude("EXX", 3.0))
-COMPARED = [Side(), PINNED, *map(scene_side, KNOWN_SCENES)]
+PINNED = compare.pinned_side(START.with_amplitude("EXX", 3.0))
+COMPARED = [Side(), PINNED, *map(compare.scene_side, KNOWN_SCENES)]
 
 
 @pytest.mark.parametrize("a", COMPARED)
@@ -341,8 +330,8 @@ def test_links_that_hold_nothing_or_more_than_an_address_are_not_followed():
     with pytest.raises(OptionError):
         open_link("", KNOWN)
     with pytest.raises(OptionError, match="expected at most 5,500"):
-        open_link(unpack("A" * 8_000), KNOWN)
-    assert unpack(pack("scene=dvf5000_first")) == "scene=dvf5000_first"
+        open_link(transfers.unpack("A" * 8_000), KNOWN)
+    assert transfers.unpack(transfers.pack("scene=dvf5000_first")) == "scene=dvf5000_first"
 
 
 def test_a_short_link_with_one_key_of_many_parts_is_refused_at_once():

@@ -130,10 +130,10 @@ def test_the_cookie_of_the_page_is_enough_for_its_websocket(guarded):
     # of a server behind the same proxy that asks for the same token
     assert ask(guarded, Cookie=f"warpspace_token_1={value}")[0] == 200
     for upgrade in ({}, UPGRADE):
+        foreign = {"Cookie": cookie, "Origin": "http://evil.example"}
         assert ask(guarded, upgrade=upgrade, Cookie=f"x=y; {cookie}")[0] == good(upgrade)
-        assert ask(guarded, upgrade=upgrade, Cookie=f"{cookie}x")[0] == 403
-        foreign = ask(guarded, upgrade=upgrade, Cookie=cookie, Origin="http://evil.example")
-        assert foreign[0] == 403
+        for headers in ({"Cookie": f"{cookie}x"}, foreign):
+            assert ask(guarded, upgrade=upgrade, **headers)[0] == 403
     assert guarded.link == f"{guarded.url}/?token={TOKEN}"
 
 
@@ -287,7 +287,7 @@ def test_the_size_of_messages_is_limited(limited, caplog):
 
 def test_a_rate_may_be_exceeded_for_a_moment():
     now = [0.0]
-    rate = Rate(10.0, 5, lambda: now[0])
+    rate = Rate(Limits(messages_per_second=10.0, burst=5), lambda: now[0])
     for at, taken in ((0.0, 5), (0.25, 2), (1000.0, 5)):
         now[0] = at
         assert [rate.take() for _ in range(taken + 1)] == [True] * taken + [False]

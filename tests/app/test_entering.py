@@ -51,11 +51,10 @@ def test_what_is_no_number_is_none(text):
     assert read_typed(text, "µrad") is None
 
 
-@pytest.mark.parametrize("value", [1.23456789, 87.3, -0.0, 1e-3, 1e5, 0.1 + 0.2])
-def test_a_box_spells_what_it_reads_back(value):
-    assert read_typed(spell_typed(value)) == pytest.approx(value, rel=1e-12, abs=0.0)
-    assert spell_typed(-0.0) == "0"
-    assert spell_typed(0.1 + 0.2) == "0.3"
+def test_a_box_spells_what_it_reads_back():
+    for value in (1.23456789, 87.3, -0.0, 1e-3, 1e5, 0.1 + 0.2):
+        assert read_typed(spell_typed(value)) == pytest.approx(value, rel=1e-12, abs=0.0)
+    assert [*map(spell_typed, (-0.0, 0.1 + 0.2))] == ["0", "0.3"]
 
 
 @pytest.mark.parametrize("order", [0.65, 2.0, 8.0, 30.0])

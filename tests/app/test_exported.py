@@ -14,12 +14,7 @@ from PIL import Image
 
 import glb
 from offline import EVIL, opened_offline, wait_for_the_map
-from warpspace.app.documents.legend import (
-    look_words,
-    picture_conditions,
-    projected_labels,
-    state_conditions,
-)
+from warpspace.app.documents import legend
 from warpspace.app.documents.offline_page import build_offline_html, offline_picture
 from warpspace.app.documents.transfers import exported_words, file_stem, shown_sides
 from warpspace.app.drawing.camera import CameraMemory, fit_camera
@@ -52,8 +47,7 @@ def picture_of(shown, state=BOTH):
 
 def rows_of(picture):
     """Rows of the exported CSV, once their errors are those that are drawn."""
-    text = write_export(picture, ".csv").decode()
-    rows = list(csv.DictReader(StringIO(text)))
+    rows = list(csv.DictReader(StringIO(write_export(picture, ".csv").decode())))
     # three components, whatever loop and frame their columns name
     names = [name for name in rows[0] if re.fullmatch(r"error_.*[xyz]_um", name)]
     errors = np.array([[float(row[name]) for name in names] for row in rows])
@@ -61,17 +55,20 @@ def rows_of(picture):
     return rows
 
 
-@pytest.mark.parametrize("shown", WORDS)
-def test_csv_holds_the_numbers_that_are_drawn(shown):
-    rows = rows_of(picture_of(shown))
+def extras_of(picture):
+    return glb.opened(write_export(picture, ".glb"))[0]["asset"]["extras"]
+
+
+@pytest.mark.parametrize(
+    ("shown", "stem"),
+    [("a", "A_present"), ("b", "B_dvf5000_second"), ("difference", "dvf5000_second_minus_present")],
+)
+def test_every_export_has_what_is_drawn_and_its_title(shown, stem):
+    picture = picture_of(shown)
+    rows = rows_of(picture)
     assert all(title in rows[0]["scene"] for title in WORDS[shown].split(": ", 1)[1].split(" − "))
     assert rows[0]["loop"] == "tool"
-
-
-@pytest.mark.parametrize("shown", WORDS)
-def test_glb_has_the_title_the_factor_and_the_shared_colours(shown):
-    picture = picture_of(shown)
-    extras = glb.opened(write_export(picture, ".glb"))[0]["asset"]["extras"]
+    extras = extras_of(picture)
     assert extras["settings"]["exaggeration"] == picture.exaggeration
     assert extras["colours"]["low"] == picture.scale.low
     assert extras["colours"]["high"] == picture.scale.high
@@ -81,16 +78,18 @@ def test_glb_has_the_title_the_factor_and_the_shared_colours(shown):
     if shown == "difference":
         assert extras["a"]["parameters"]["EXX"]["amplitude"] == 6.0
         assert "parameters" not in extras
-
-
-@pytest.mark.parametrize("shown", WORDS)
-def test_the_offline_page_says_what_it_shows(shown):
-    picture = picture_of(shown)
     page = build_offline_html(picture)
     assert WORDS[shown] in page.partition("<main>")[0]
     errors = page.partition("<aside>")[2]
     assert ("A +6, B 0 µm" in errors) == (shown == "difference")
     assert ("+6 µm" in errors) == (shown == "a")
+    assert file_stem(picture) == stem
+    assert exported_words(picture).startswith(f"Pictures and exports show {WORDS[shown]}.")
+
+
+def test_a_picture_without_a_comparison_has_the_name_of_its_scene():
+    picture = LIVE.evaluate(START)
+    assert (exported_words(picture), file_stem(picture)) == ("", "dvf5000_first")
 
 
 @pytest.mark.render
@@ -112,7 +111,7 @@ def tilted(top=None):
 @pytest.mark.parametrize("top", [None, 7.0])
 def test_glb_has_the_tilts_and_the_range_that_are_coloured(top):
     picture = tilted(top)
-    extras = glb.opened(write_export(picture, ".glb"))[0]["asset"]["extras"]
+    extras = extras_of(picture)
     assert extras["settings"]["coloured"] == "tool-orientation error"
     assert extras["colours"]["high"] == (picture.scale.high if top is None else top)
     assert extras["colours"]["unit"] == "µrad"
@@ -121,8 +120,7 @@ def test_glb_has_the_tilts_and_the_range_that_are_coloured(top):
 
 @pytest.mark.render
 def test_the_figure_shows_what_is_coloured_in_the_range_that_is_fixed(renderer):
-    content = draw_figure(tilted(7.0), "", threading.Event())
-    about = Image.open(BytesIO(content)).info
+    about = Image.open(BytesIO(draw_figure(tilted(7.0), "", threading.Event()))).info
     assert about["Title"].startswith("Orientation error of the tool axis")
     said = dict(pair.split("=") for pair in about["Description"].partition(";")[0].split(", "))
     assert (said["figure"], said["range"]) == ("orientation-map", "7")
@@ -134,18 +132,6 @@ def test_two_loops_on_one_sheet_are_refused_in_words():
         draw_figure(picture, "", threading.Event())
     # the other exports draw each side through its own
     assert rows_of(picture)[0]["loop"] == "relative − tool"
-
-
-@pytest.mark.parametrize(
-    ("shown", "stem"),
-    [("a", "A_present"), ("b", "B_dvf5000_second"), ("difference", "dvf5000_second_minus_present")],
-)
-def test_files_and_the_panel_name_what_is_exported(shown, stem):
-    picture = picture_of(shown)
-    assert file_stem(picture) == stem
-    assert exported_words(picture).startswith(f"Pictures and exports show {WORDS[shown]}.")
-    assert exported_words(LIVE.evaluate(START)) == ""
-    assert file_stem(LIVE.evaluate(START)) == "dvf5000_first"
 
 
 def test_volumes_that_differ_export_the_side_that_is_drawn():
@@ -169,33 +155,33 @@ def fixed(state):
 
 
 def test_conditions_name_what_is_excluded_and_the_range():
-    assert picture_conditions(LIVE.evaluate(START)) == ()
+    assert legend.picture_conditions(LIVE.evaluate(START)) == ()
     both = put(without("EA0Z"), "exclusions.excluded", "+EAX")
-    assert picture_conditions(fixed(both)) == ("excluded: EAX, EA0Z", "range fixed 0–50 µm")
+    assert legend.picture_conditions(fixed(both)) == ("excluded: EAX, EA0Z", "range fixed 0–50 µm")
     only = put(START, "exclusions.only", "+EAX")
-    assert picture_conditions(LIVE.evaluate(only)) == ("only: EAX",)
+    assert legend.picture_conditions(LIVE.evaluate(only)) == ("only: EAX",)
     # an error that is zero changes nothing when it is left out
-    assert picture_conditions(LIVE.evaluate(without("EYX"))) == ()
+    assert legend.picture_conditions(LIVE.evaluate(without("EYX"))) == ()
     assert range_words(-20.0, 20.0, "µm") == "range fixed −20 to 20 µm"
 
 
 def test_exports_say_the_conditions():
     picture = fixed(without("EA0Z"))
     assert rows_of(picture)[0]["conditions"] == "excluded: EA0Z; range fixed 0–50 µm"
-    extras = glb.opened(write_export(picture, ".glb"))[0]["asset"]["extras"]
+    extras = extras_of(picture)
     assert extras["settings"]["conditions"] == ["excluded: EA0Z", "range fixed 0–50 µm"]
     assert extras["statistics"]["max_at_axes"]["Z"] in (-480.0, -80.0)
     footer = build_offline_html(picture).partition("<footer>")[2]
     assert "excluded: EA0Z" in footer
     assert "range fixed 0–50 µm" in footer
-    assert "excluded: EA0Z" in look_words(picture)  # of pictures of the screen
+    assert "excluded: EA0Z" in legend.look_words(picture)  # of pictures of the screen
 
 
 def test_a_comparison_says_the_conditions_of_each_side():
     picture = picture_of("difference", with_sides(without("EA0Z"), Side(), scene_side(SECOND)))
-    assert picture_conditions(picture) == ("A excluded: EA0Z",)
+    assert legend.picture_conditions(picture) == ("A excluded: EA0Z",)
     assert rows_of(picture)[0]["conditions"] == "A excluded: EA0Z"
-    conditions = [state_conditions(one) for one in shown_sides(picture)]
+    conditions = [legend.state_conditions(one) for one in shown_sides(picture)]
     assert conditions == [("excluded: EA0Z",), ()]
 
 
@@ -244,9 +230,9 @@ def test_a_picture_of_the_screen_says_what_it_shows_beside_its_pixels():
     pose = fit_camera(picture.drawn_mm.reshape(-1, 3), 1.5, margins=(0.2, 0.2, 0.2, 0.2))
     pixels = np.zeros((400, 600, 4), np.uint8)
     pixels[180:220, 250:350] = (90, 10, 200, 255)
-    words, px_per_mm = projected_labels(picture, pose, 400, 600)
+    words, px_per_mm = legend.projected_labels(picture, pose, 400, 600)
     unbarred = replace(picture, state=replace(BOTH, look=replace(BOTH.look, bars=False)))
-    assert projected_labels(unbarred, pose, 400, 600)[1] is None
+    assert legend.projected_labels(unbarred, pose, 400, 600)[1] is None
     # a millimetre of the middle of the picture, seen from as far
     assert px_per_mm == pytest.approx(
         200.0 / np.tan(pose.fov_rad / 2.0)

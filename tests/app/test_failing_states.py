@@ -54,7 +54,9 @@ def test_a_panel_that_fails_whatever_is_shown_does_not_hold_the_state(
         monkeypatch.setattr(STAGES["conditions"][0], "render", fail)
         for value in ("3", "4"):
             wire.say("errors:set.EXX", value)
-            assert wire.read_until(lambda: session.display.due_in_s is None and any(wire.toasts))
+            assert wire.read_until(
+                lambda: session.display.scheduler.due_in_s is None and any(wire.toasts)
+            )
             wire.toasts.clear()
         wire.say("errors:set.EXX", "5")
         assert wire.read_until(lambda: any(wire.toasts))

@@ -118,9 +118,8 @@ def test_two_machines_are_compared_with_a_picture_in_three_actions(tab, renderer
 @pytest.mark.daily
 def test_a_drag_ends_where_the_hand_stopped_and_digits_set_a_number(tab):
     slider = tab.page.locator("input[type=range][data-set='errors:set.EA0Z']")
-    tab.page.evaluate(
-        "() => { for (let i = 0; i < 40; i++) warpspacePage.send('errors:set.EA0Z', 33.9 - i); }"
-    )
+    drag = "for (let i = 0; i < 40; i++) warpspacePage.send('errors:set.EA0Z', 33.9 - i);"
+    tab.page.evaluate(f"() => {{ {drag} }}")
     wanted = replace(tab.state, amplitudes={**tab.state.amplitudes, "EA0Z": -5.1})
     tab.until(lambda: tab.state.amplitudes["EA0Z"] == pytest.approx(-5.1))
     tab.until(lambda: tab.shows_state(wanted))
@@ -185,14 +184,9 @@ def test_a_click_asks_why_and_a_saved_scene_holds_what_was_changed(tab):
     assert parse_scene(text, "saved", "saved").errors.amplitude("EXX") == 3.25
     with tab.page.expect_download(timeout=60_000) as saved:
         tab.send("files:view")
-    assert (
-        Image.open(BytesIO(saved.value.path().read_bytes())).info["Title"] == tab.state.scene.title
-    )
+    about = Image.open(BytesIO(saved.value.path().read_bytes())).info
+    assert about["Title"] == tab.state.scene.title
     tab.send("page:reset")
     tab.until(lambda: tab.state.amplitudes["EXX"] == 0.0)
-    tab.give(
-        "mine.toml",
-        text.encode(),
-        tab.page.get_by_role("button", name="Open").first.click,
-    )
+    tab.give("mine.toml", text.encode(), tab.page.get_by_role("button", name="Open").first.click)
     tab.until(lambda: tab.state.amplitudes["EXX"] == 3.25 and tab.state.picked is not None)

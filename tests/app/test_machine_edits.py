@@ -19,12 +19,7 @@ from warpspace.app.evaluation.machine_edits import (
     with_own_machine,
     with_word,
 )
-from warpspace.app.panels.machine_editor import (
-    EditorSection,
-    MachinesDialog,
-    PositionsSection,
-    RotarySection,
-)
+from warpspace.app.panels import machine_editor
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.edits import with_curve, with_scene_tolerances
 from warpspace.app.state.tree import put
@@ -37,10 +32,12 @@ from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.scene_writer import scene_to_toml
 
+STATE = start_state(load_scene("dvf5000_first"), nodes=5)
+
 
 @pytest.fixture
 def state():
-    return start_state(load_scene("dvf5000_first"))
+    return start_state(STATE.scene)
 
 
 def guides(state, axis):
@@ -81,8 +78,7 @@ def test_curves_that_were_scaled_stay_the_same_functions_of_the_position(state):
 
 def test_the_machine_of_the_scene_comes_back_with_the_errors_of_its_axes(state):
     assert with_own_machine(state) is state
-    changed = with_word(with_word(state, "chain wFXYZt"), "offset X 0 12")
-    back = with_word(changed, "own")
+    back = with_word(with_word(with_word(state, "chain wFXYZt"), "offset X 0 12"), "own")
     assert (back.scene, back.amplitudes, back.tolerances, back.loaded) == (
         state.scene, state.amplitudes, state.tolerances, None
     )  # fmt: skip
@@ -136,7 +132,7 @@ def test_what_cannot_be_is_refused_with_a_note_and_words_that_are_none_without(s
 
 def test_every_machine_of_the_library_starts_with_its_own_scene(state):
     state = state.with_amplitude("EAX", 33.0)
-    window = lone_part(MachinesDialog)
+    window = lone_part(machine_editor.MachinesDialog)
     for name, scene in library().items():
         changed = window.handle(state, "choose", name)
         if name == state.scene.machine.name:  # as it was opened, with all that has been entered
@@ -176,7 +172,7 @@ def test_what_stands_somewhere_stays_within_the_ranges_of_another_machine(state)
 
 
 def test_a_chain_that_is_refused_stays_in_its_box_with_the_reason(state):
-    editor = lone_part(EditorSection)
+    editor = lone_part(machine_editor.EditorSection)
     assert editor.handle(state, "set.chain", "wC<script>") is state
     text = editor.body(LIVE.evaluate(state))
     assert 'value="wC&lt;script&gt;"' in text
@@ -216,8 +212,7 @@ def test_guides_share_the_curve_of_the_axis_and_other_curves_are_said(state):
     pair = with_word(made, "guide Y 1 12")
     assert guides(pair, "Y") == pytest.approx((8.0, 12.0))
     assert pair.curve("ECY").evaluate(np.array([-225.0])) == pytest.approx(0.0)
-    by_direction = Directional(ramp.span, ramp, Ramp(ramp.span, 6.0))
-    for curve in (Constant(ramp.span, 5.0), by_direction):
+    for curve in (Constant(ramp.span, 5.0), Directional(ramp.span, ramp, Ramp(ramp.span, 6.0))):
         other = with_curve(pair, "ECY", curve)
         assert guides(other, "Y") is None
         refused = with_word(other, "guide Y 0 1")
@@ -232,54 +227,52 @@ def test_meshes_of_the_scene_are_listed_without_their_folder_and_go(tmp_path):
     mesh = '{ file = "pillar.stl", unit = "cm", offset_mm = [0, 0, 50] }'
     path.write_text(f"{text}\n[bodies]\nX = {mesh}\n", encoding="utf-8")
     state = start_state(load_scene(path))
-    html = body_of(EditorSection, state)
+    html = body_of(machine_editor.EditorSection, state)
     assert "pillar.stl · cm · offset 0, 0, 50 mm" in html
     assert str(tmp_path) not in html
     moved, gone = with_word(state, "offset X 2 150").scene, with_word(state, "mesh X")
     assert moved.machine.bodies == state.scene.machine.bodies
     assert not any("cannot be read" in note for note in moved.notes)
-    assert "pillar.stl" not in body_of(EditorSection, gone)
+    assert "pillar.stl" not in body_of(machine_editor.EditorSection, gone)
     for machine, is_there in ((moved.machine, True), (gone.scene.machine, False)):
         assert ("X_pillar" in {body.name for body in load_bodies(machine)}) is is_there
 
 
 # --- Where the axes stand, and traces of rotary ones ----------------------------------------------
 
-STATE = start_state(load_scene("dvf5000_first"), nodes=5)
-
 
 def test_every_axis_has_a_slider_whose_event_moves_it():
     moved = put(put(STATE, "positions.B", "-30"), "machine.linear_mm.X", "100")
-    text = body_of(PositionsSection, moved)
+    text = body_of(machine_editor.PositionsSection, moved)
     assert text.count('type="range"') == 5
     assert 'value="-30"' in text
     assert "Tool point: axes X 100 " in text
 
 
 def test_traces_are_drawn_in_numbers_where_an_error_moves_them():
-    assert "No error moves the traced points" in body_of(RotarySection, STATE)
+    assert "No error moves the traced points" in body_of(machine_editor.RotarySection, STATE)
     rising = Ramp(STATE.axis_span("EZC"), 8.0)  # by hand: 8 µm higher after a turn
     state = with_curve(STATE, "EZC", rising)
-    text = body_of(RotarySection, state)
+    text = body_of(machine_editor.RotarySection, state)
     assert text.count("<svg") == 3
     assert "8.00 µm" in text
     located = with_curve(STATE, "EX0C", Constant(rising.span, 6.0))
-    text = body_of(RotarySection, located.with_amplitude("EA0C", 20.0))
+    text = body_of(machine_editor.RotarySection, located.with_amplitude("EA0C", 20.0))
     for head, unit in (("displaced", "µm"), ("inclined", "µrad"), ("radial", "µm")):
         assert f"<th>{head} <small>{unit}</small></th>" in text
     # by hand: 450 mm above the table, 20 µrad add 9 µm across to 6 µm
     row = ("275.0", "10.82", "20.00", "21.63 /\u00a00.00", "0.00 /\u00a00.00", "40.00 /\u00a00.00")
     name = "C at B 0°, point (0, 275, 450) mm"
     assert f"{name}</td></tr><tr><td>{'</td><td>'.join(row)}</td>" in text
-    hidden = body_of(RotarySection, put(state, "shown.traces", "0"))
+    hidden = body_of(machine_editor.RotarySection, put(state, "shown.traces", "0"))
     assert "Show traces" in hidden
     assert "<svg" not in hidden
     mill = start_state(load_scene("machine_c_frame_mill"))
-    assert "no rotary axis" in body_of(RotarySection, mill)
+    assert "no rotary axis" in body_of(machine_editor.RotarySection, mill)
 
 
 def test_a_table_that_is_paused_can_stand_there_and_axes_be_held_at_quarters():
-    section = lone_part(RotarySection)
+    section = lone_part(machine_editor.RotarySection)
     state = replace(STATE, page=replace(STATE.page, task="machine", open=frozenset({"rotary"})))
     section.context.stage = SimpleNamespace(playing=False, position={"C": 89.7})
     text = section.body(LIVE.evaluate(state))
@@ -381,8 +374,7 @@ def test_a_second_axis_stands_still_and_one_in_place_of_another_spans_the_volume
 
 
 def test_an_axis_moves_along_the_chain_across_the_frame_and_away():
-    names = []
-    scene = PLAIN
+    names, scene = [], PLAIN
     for way in ("right", "right", "left", "left", "left"):
         scene = edit(f"{way} B", scene)
         names.append(str(scene.machine.chain))
@@ -415,15 +407,12 @@ def test_an_offset_moves_the_tool_point_and_a_rotation_turns_what_stands_behind_
     assert edit("rotation S 2 0").machine.fixed_deg == {}
 
 
-def test_a_travel_and_a_direction():
+def test_a_travel_a_direction_and_bodies_that_stay_as_long_as_the_frames_do():
     scene = edit("travel X 1 150 mm")
     assert (scene.machine.axes["X"].travel, scene.workspace) == ((-300.0, 150.0), PLAIN.workspace)
     assert any("reaches beyond the travel" in note for note in scene.notes)
     assert edit("volume Z 0 50").workspace.ranges["Z"] == (50.0, 50.0)
     assert edit("turn B").machine.axes["B"].direction == -1
-
-
-def test_bodies_of_the_library_stay_as_long_as_the_frames_do():
     scene = load_scene("dvf5000_first")
     own = scene.machine.body_dir
     assert own

@@ -13,15 +13,8 @@ from warpspace.analysis.registry import entries
 from warpspace.app.documents.scene_file import settings_line, with_settings
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.live_model import LiveModel
-from warpspace.app.panels.import_panel import ImportPanel
-from warpspace.app.panels.measurement import (
-    MOST_FILES,
-    CalibratePanel,
-    TestsPanel,
-    UploadedFile,
-    arrows_of,
-    read_uploaded,
-)
+from warpspace.app.panels import measurement
+from warpspace.app.panels.upload_panels import ImportPanel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put
@@ -72,7 +65,9 @@ class Column(Alone):
 
 
 def calibrate():
-    return Column(CalibratePanel, START, next(one for one in entries() if one.name == "calibrate"))
+    return Column(
+        measurement.CalibratePanel, START, next(one for one in entries() if one.name == "calibrate")
+    )
 
 
 def positioned(targets):
@@ -88,7 +83,7 @@ def positioned(targets):
 
 @pytest.mark.parametrize("name", bench_names())
 def test_figure_and_path_follow_the_errors(name):
-    column = Column(TestsPanel, STATE)
+    column = Column(measurement.TestsPanel, STATE)
     depends = column.part.dependencies(LIVE.evaluate(column.state))
     column.do("choose", name)
     assert column.part.dependencies(LIVE.evaluate(column.state)) != depends
@@ -117,7 +112,7 @@ def test_figure_and_path_follow_the_errors(name):
     ],
 )
 def test_what_cannot_be_run_is_said_in_its_place(name, options, message):
-    column = Column(TestsPanel, STATE)
+    column = Column(measurement.TestsPanel, STATE)
     column.do("choose", name)
     column.settle()
     for option, text in options.items():
@@ -130,16 +125,18 @@ def test_what_cannot_be_run_is_said_in_its_place(name, options, message):
 
 def test_a_test_runs_where_the_tables_stand_or_says_why_it_cannot():
     turned = put(replace(STATE, forms={"test": "r-test"}), "positions.B", "-20.0")
-    column = Column(TestsPanel, turned)
+    column = Column(measurement.TestsPanel, turned)
     column.settle()
     assert column.part.outcome.result.model.plan.coordinates["B"][0] == -20.0
-    column = Column(TestsPanel, start_state(load_scene("machine_c_frame_mill"), nodes=3))
+    column = Column(
+        measurement.TestsPanel, start_state(load_scene("machine_c_frame_mill"), nodes=3)
+    )
     column.do("choose", "r-test")
     assert "no rotary axis" in column.settle()
 
 
 def test_measured_readings_stand_beside_the_model_and_go_into_the_report():
-    column = Column(TestsPanel, STATE)
+    column = Column(measurement.TestsPanel, STATE)
     column.do("choose", "positioning")
     column.do("choose", HOSTILE)
     column.do("set.nothing", HOSTILE)
@@ -193,7 +190,7 @@ def test_the_numbers_are_those_of_the_analysis(fitted):
         assert (one.key, one.identifiable) == (row["key"], row["identifiable"])
         assert one.value == pytest.approx(row["value"], rel=1e-9)
     assert "Confounded" in html
-    assert arrows_of(found, before=True)[0].shape == (23, 3)
+    assert measurement.arrows_of(found, before=True)[0].shape == (23, 3)
 
 
 def test_an_applied_fit_gives_errors_that_had_no_row_and_one_undo_takes_it_back(fitted):
@@ -237,7 +234,7 @@ def test_nothing_of_a_browser_becomes_a_path(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for kind in (None, "sphere-tcp", "positioning", "circular:plane=XY"):
         with pytest.raises(WarpspaceError, match="secret"):
-            read_uploaded(SCENE, "", str(secret), kind, ())
+            measurement.read_uploaded(SCENE, "", str(secret), kind, ())
     column = calibrate()
     for name in (str(secret), "secret.csv", "../secret.csv"):
         column.do("bundled", name)
@@ -247,15 +244,15 @@ def test_nothing_of_a_browser_becomes_a_path(tmp_path, monkeypatch):
 
 
 def test_files_have_names_of_their_own_and_are_few():
-    files: tuple[UploadedFile, ...] = ()
-    for _ in range(MOST_FILES):
-        files = (*files, read_uploaded(SCENE, BUNDLED.decode(), "a.csv", None, files))
-    assert len({one.name for one in files}) == MOST_FILES
+    files: tuple[measurement.UploadedFile, ...] = ()
+    for _ in range(measurement.MOST_FILES):
+        files = (*files, measurement.read_uploaded(SCENE, BUNDLED.decode(), "a.csv", None, files))
+    assert len({one.name for one in files}) == measurement.MOST_FILES
     with pytest.raises(OptionError, match="remove one first"):
-        read_uploaded(SCENE, BUNDLED.decode(), "a.csv", None, files)
+        measurement.read_uploaded(SCENE, BUNDLED.decode(), "a.csv", None, files)
     rows = "".join(f"1,1,{n},2\n" for n in range(5_001))
     with pytest.raises(OptionError, match="at most 5,000"):
-        read_uploaded(SCENE, f"x_mm,y_mm,z_mm,b_deg\n{rows}", "a.csv", None, ())
+        measurement.read_uploaded(SCENE, f"x_mm,y_mm,z_mm,b_deg\n{rows}", "a.csv", None, ())
 
 
 @pytest.mark.parametrize("keys", ["EQ0", "auto,EX0B", HOSTILE])
@@ -278,7 +275,7 @@ def test_readings_of_a_standard_test_come_with_its_options():
     column.run()
     found = column.part.outcome.result
     assert found.rms_after_mm < 1e-9 < found.rms_before_mm
-    assert arrows_of(found, before=True)[0].shape == (0, 3)
+    assert measurement.arrows_of(found, before=True)[0].shape == (0, 3)
 
 
 COMP = "-20 0.001 0.003\n0 0.002 0.004\n20 0.005 0.006\n"

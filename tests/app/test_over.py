@@ -13,8 +13,14 @@ from warpspace.app.drawing.colours import colour_levels
 from warpspace.app.drawing.labels import axes, point_labels
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
 from warpspace.app.panels.design import SAMPLES
-from warpspace.app.panels.overlay import HeadPanel, LegendPanel, OrderPanel
-from warpspace.app.panels.toolbar import ComparePanel, ControlsPanel, chosen_map
+from warpspace.app.panels.overlay import (
+    ComparePanel,
+    ControlsPanel,
+    HeadPanel,
+    LegendPanel,
+    OrderPanel,
+    chosen_map,
+)
 from warpspace.app.state.app_state import NOBODY, Side, start_state
 from warpspace.app.state.tree import put
 from warpspace.exceptions import SceneError
@@ -73,12 +79,11 @@ def test_names_beside_the_colour_bar_keep_apart():
 
 
 def test_a_scene_file_carries_the_limit():
-    scene = replace(FIRST, limit_um=40.0)
-    back = parse_scene(scene_to_toml(scene), "x")
-    assert start_state(back).specification.limit_um == 40.0
-    assert start_state(back).resulting_scene().limit_um == 40.0
+    text = scene_to_toml(replace(FIRST, limit_um=40.0))
+    back = start_state(parse_scene(text, "x"))
+    assert back.specification.limit_um == back.resulting_scene().limit_um == 40.0
     assert START.resulting_scene().limit_um is None
-    text = scene_to_toml(scene).replace("limit_um = 40.0", "limit_um = -1")
+    text = text.replace("limit_um = 40.0", "limit_um = -1")
     with pytest.raises(SceneError, match=r"view\.limit_um = -1: expected"):
         parse_scene(text, "x")
 
@@ -100,8 +105,7 @@ def test_axes_are_numbered_in_positions_of_the_machine():
 def test_the_worst_corner_is_labelled_once():
     picture = LIVE.evaluate(put(START, "look.arrows", "1"))
     kinds = [label.kind for label in point_labels(picture)]
-    assert kinds.count("worst") == 1
-    assert kinds.count("corner") == 7
+    assert (kinds.count("worst"), kinds.count("corner")) == (1, 7)
 
 
 def test_controls_set_what_is_coloured_and_how_the_machine_is_drawn():
@@ -143,16 +147,14 @@ def picture_of(state, shown):
 def test_a_and_b_share_colours_and_all_three_factor_and_numbers():
     state = with_sides(START, Side(), scene_side(SECOND))
     a, b, difference = (picture_of(state, shown) for shown in ("a", "b", "difference"))
-    alone = [LIVE.evaluate(start_state(scene, nodes=9)) for scene in (FIRST, SECOND)]
-    np.testing.assert_array_equal(a.field.error_um, alone[0].field.error_um)
-    np.testing.assert_array_equal(b.field.error_um, alone[1].field.error_um)
-    np.testing.assert_allclose(
-        difference.field.error_um, b.field.error_um - a.field.error_um, atol=1e-12
-    )
+    for scene, side, statistics in ((FIRST, a, a.compared.a), (SECOND, b, a.compared.b)):
+        alone = LIVE.evaluate(start_state(scene, nodes=9))
+        np.testing.assert_array_equal(side.field.error_um, alone.field.error_um)
+        assert statistics == alone.statistics
+    change = b.field.error_um - a.field.error_um
+    np.testing.assert_allclose(difference.field.error_um, change, atol=1e-12)
     assert a.scale == b.scale
     assert a.exaggeration == b.exaggeration == difference.exaggeration
-    assert a.compared.a == alone[0].statistics
-    assert a.compared.b == alone[1].statistics
     assert a.compared.difference == difference.statistics
     np.testing.assert_array_equal(a.compared.other_mm, b.drawn_mm)
 
@@ -172,9 +174,8 @@ def test_a_change_has_colours_of_its_own(component, label):
 
 
 def test_a_pinned_state_holds_no_comparison():
-    twice = pinned_side(with_pin(START)).state
-    assert twice.comparison.b is None
-    assert twice.comparison.pinned is None
+    twice = pinned_side(with_pin(START)).state.comparison
+    assert (twice.b, twice.pinned) == (None, None)
 
 
 def test_the_difference_is_cut_into_slices_evaluated_where_they_lie():

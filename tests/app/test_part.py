@@ -2,14 +2,12 @@
 
 import time
 from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 import trimesh
 
-from app.page_tab import Tab, open_page
+from app.page_tab import open_page
 from app.parts import LIVE
 from warpspace.app.documents.legend import GEOMETRY_ONLY, part_html
 from warpspace.app.documents.scene_file import open_link, open_text, state_to_link, state_to_toml
@@ -17,16 +15,13 @@ from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.point_explanation import pick_line
 from warpspace.app.evaluation.scene_overlays import moved_place, part_overlay
 from warpspace.app.server.viewer import Viewer
-from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put
 from warpspace.kinematics import transforms
 from warpspace.parts.workpiece import Workpiece, evaluate_points, place_workpiece
 from warpspace.resources import scenes_dir
 from warpspace.scene.library import load_scene
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser
 
 SCENE = load_scene("dvf5000_first")
 TRIANGLES = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
@@ -35,7 +30,7 @@ MESH = Workpiece(
 )
 
 
-def holding(state: AppState, mesh: Workpiece = MESH, place: str = "") -> AppState:
+def holding(state, mesh=MESH, place=""):
     state = replace(state, part=replace(state.part, mesh=mesh, name=mesh.name))
     return put(state, "part.place", place)
 
@@ -44,12 +39,11 @@ STATE = holding(start_state(SCENE))
 
 
 @pytest.mark.parametrize("turned", [{}, {"B": 30.0, "C": 75.0}])
-def test_what_is_drawn_is_what_the_machine_makes(turned: dict[str, float]) -> None:
+def test_what_is_drawn_is_what_the_machine_makes(turned):
     state = holding(replace(start_state(SCENE), positions={"B": 0.0, "C": 0.0, **turned}),
                     place="20,-30,140,0,0,25")  # fmt: skip
     state = put(state, "amplitudes.EXX", "12")
     found = LIVE.evaluate(state).part
-    assert found is not None
     scene = replace(state, scene=state.active_scene()).standing
     made = evaluate_points(scene, place_workpiece(MESH, scene, state.part.place).vertices_mm)
     back = np.linalg.inv(found.pose)
@@ -59,40 +53,34 @@ def test_what_is_drawn_is_what_the_machine_makes(turned: dict[str, float]) -> No
     np.testing.assert_allclose(drawn, 1e-3 * found.error_um, atol=1e-4)
 
 
-def test_a_part_in_the_middle_stands_in_the_middle_of_the_box() -> None:
+def test_a_part_in_the_middle_stands_in_the_middle_of_the_box():
     picture = LIVE.evaluate(STATE)
-    assert picture.part is not None
-    middle = picture.part.nominal_mm
-    middle = (middle.min(axis=0) + middle.max(axis=0)) / 2.0
+    points = picture.part.nominal_mm
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
     np.testing.assert_allclose(middle, picture.grid.bounds_mm.mean(axis=0), atol=1e-3)
 
 
-def test_the_change_of_a_part_is_b_less_a() -> None:
-    pinned = with_pin(STATE)
-    changed = put(put(pinned, "amplitudes.EC0Y", "80"), "comparison.shown", "difference")
-    found = LIVE.evaluate(changed).part
-    a, b = (LIVE.evaluate(one).part for one in (STATE, put(STATE, "amplitudes.EC0Y", "80")))
-    assert found is not None and a is not None and b is not None  # noqa: PT018
+def test_the_change_of_a_part_is_b_less_a():
+    changed = put(STATE, "amplitudes.EC0Y", "80")
+    compared = put(put(with_pin(STATE), "amplitudes.EC0Y", "80"), "comparison.shown", "difference")
+    found, a, b = (LIVE.evaluate(state).part for state in (compared, STATE, changed))
     np.testing.assert_allclose(found.error_um, b.error_um - a.error_um, atol=1e-4)
 
 
-def test_turns_keep_the_middle_and_add_up() -> None:
+def test_turns_keep_the_middle_and_add_up():
     placed = part_overlay(STATE)
-    assert placed is not None
     for turn in 90.0 * np.eye(3):
         state = STATE
         for _ in range(4):
-            again = part_overlay(state)
-            assert again is not None
-            np.testing.assert_allclose(again.of.middle_mm, placed.of.middle_mm, atol=5e-3)
-            place = moved_place(again.of, transforms.placed(again.of.middle_mm, turn))
+            part = part_overlay(state).of
+            np.testing.assert_allclose(part.middle_mm, placed.of.middle_mm, atol=5e-3)
+            place = moved_place(part, transforms.placed(part.middle_mm, turn))
             state = replace(state, part=replace(state.part, place=place))
-        again = part_overlay(state)
-        assert again is not None
-        np.testing.assert_allclose(again.of.vertices_mm, placed.of.vertices_mm, atol=5e-3)
+        again = part_overlay(state).of.vertices_mm
+        np.testing.assert_allclose(again, placed.of.vertices_mm, atol=5e-3)
 
 
-def test_a_place_is_typed_linked_and_undone() -> None:
+def test_a_place_is_typed_linked_and_undone():
     store = StateStore(STATE)
     store.apply(lambda state: put(state, "part.place", "10; 20; 140"))
     assert store.state.part.place == (10.0, 20.0, 140.0)
@@ -106,7 +94,7 @@ def test_a_place_is_typed_linked_and_undone() -> None:
     assert "expected three numbers, or six" in put(STATE, "part.place", "1,2").notes[0]
 
 
-def test_the_part_of_a_scene_comes_with_it_and_stays(tmp_path: Path) -> None:
+def test_the_part_of_a_scene_comes_with_it_and_stays(tmp_path):
     trimesh.creation.box((200, 150, 80)).export(tmp_path / "block.stl")
     (tmp_path / "ring.ngc").write_bytes(PROGRAM)
     text = (scenes_dir() / "dvf5000_first.toml").read_text("utf-8")
@@ -114,7 +102,7 @@ def test_the_part_of_a_scene_comes_with_it_and_stays(tmp_path: Path) -> None:
     (tmp_path / "own.toml").write_text(f"{text}\n{part}", "utf-8")
     own = start_state(load_scene(tmp_path / "own.toml"))
     picture = LIVE.evaluate(own)
-    assert picture.part is not None and picture.path is not None  # noqa: PT018
+    assert None not in (picture.part, picture.path)
     assert (own.part.name, own.look.surface) == ("block.stl", "grid")
     assert own.with_scene(SCENE).part == own.part  # until another comes
     assert STATE.with_scene(own.scene).part == own.part
@@ -122,34 +110,26 @@ def test_the_part_of_a_scene_comes_with_it_and_stays(tmp_path: Path) -> None:
     assert (sent.part.name, sent.part.is_empty) == ("block.stl", True)
 
 
-def test_what_leaves_the_travel_is_said() -> None:
+def test_what_leaves_the_travel_is_said():
     words = part_html(LIVE.evaluate(put(STATE, "part.place", "2000,0,0")))
     assert "4 points beyond the travel" in words
     assert GEOMETRY_ONLY in words
     assert part_html(LIVE.evaluate(put(STATE, "part.shown", "0"))) == ""
 
 
-def test_a_slider_moves_a_large_part_in_60_ms() -> None:
+def test_a_slider_moves_a_large_part_in_60_ms():
     count = 100_000
     point = np.random.default_rng(1).uniform(-100.0, 100.0, (count, 3))
-    triangles = np.arange(count - 1, dtype="i4")[:, None].repeat(3, axis=1) % (count - 3) + [
-        0,
-        1,
-        2,
-    ]
+    triangles = np.arange(count - 1)[:, None] % (count - 3) + [0, 1, 2]
     state = holding(start_state(SCENE), Workpiece("large", point, triangles.astype("i4")))
-    part = LIVE.evaluate(state).part
-    assert part is not None
-    best = 1.0
-    for value in range(5):
+    times = []
+    for value in range(6):  # the first one computes the response
         state, began = put(state, "amplitudes.EA0Z", str(value)), time.process_time()
         picture = LIVE.evaluate(state)
-        part = picture.part
-        assert part is not None
-        picture.coloured(part)
-        part.drawn_mm(1000.0)
-        best = min(best, time.process_time() - began)
-    assert best < 0.06
+        picture.coloured(picture.part)
+        picture.part.drawn_mm(1000.0)
+        times.append(time.process_time() - began)
+    assert min(times) < 0.06
 
 
 # --- In the browser -------------------------------------------------------------------------------
@@ -158,21 +138,20 @@ PROGRAM = b"G21 G90\nG0 X-60 Y-40 Z-250\nG1 X60 F500\nG2 X60 Y40 J40\nG1 X-60\nG
 TOLERANCES = b'[[features]]\nname = "top"\nis = "plane 1"\nmeasure = "flatness"\ntolerance_um = 2\n'
 
 
-def opened(tab: Tab, name: str, content: bytes) -> None:
+def opened(tab, name, content):
     tab.give(name, content, tab.page.get_by_role("button", name="Open").first.click)
 
 
-def drawn_part(tab: Tab) -> bool:
+def drawn_part(tab) -> bool:
     """Whether the page draws what the session shows, a tenth of a millimetre apart at most."""
-    found, part = tab.drawn("/part/surface"), LIVE.evaluate(tab.state).part
-    if found is None or part is None:
+    found, picture = tab.drawn("/part/surface"), LIVE.evaluate(tab.state)
+    if found is None or picture.part is None:
         return False
-    picture = LIVE.evaluate(tab.state)
-    wanted = part.drawn_mm(picture.exaggeration)[part.at]
-    return found.shape == wanted.shape and bool(np.abs(found - wanted).max() < 0.1)
+    wanted = picture.part.drawn_mm(picture.exaggeration)[picture.part.at]
+    return found.shape == wanted.shape and np.abs(found - wanted).max() < 0.1
 
 
-def test_a_part_is_opened_bent_by_a_slider_turned_and_judged(tab: Tab) -> None:
+def test_a_part_is_opened_bent_by_a_slider_turned_and_judged(tab):
     block = trimesh.creation.box((200, 150, 80)).export(file_type="stl")
     opened(tab, "block.stl", block)
     tab.says("Part block.stl up to")
@@ -192,7 +171,7 @@ def test_a_part_is_opened_bent_by_a_slider_turned_and_judged(tab: Tab) -> None:
     assert tab.errors == []
 
 
-def test_a_line_of_a_program_and_its_place_find_each_other(tab: Tab) -> None:
+def test_a_line_of_a_program_and_its_place_find_each_other(tab):
     opened(tab, "ring.ngc", PROGRAM)
     tab.says("Program ring.ngc up to")
     tab.says("Worst blocks", within="[data-key=program]")
@@ -200,18 +179,16 @@ def test_a_line_of_a_program_and_its_place_find_each_other(tab: Tab) -> None:
     tab.says("G2 X60 Y40 J40", within="[data-key=program]")
     tab.until(lambda: tab.drawn("/program/line") is not None)
     picture = LIVE.evaluate(tab.state)
-    assert picture.path is not None
     drawn = picture.path.drawn_mm(picture.exaggeration)
     end = drawn[np.flatnonzero(picture.path.of.line == 3)[-1]]
-    np.testing.assert_allclose(
-        tab.drawn("/program/line"), drawn[np.flatnonzero(picture.path.of.line == 4)[-1:]], atol=0.1
-    )
+    marked = drawn[np.flatnonzero(picture.path.of.line == 4)[-1:]]
+    np.testing.assert_allclose(tab.drawn("/program/line"), marked, atol=0.1)
     eye = end + np.array([0.0, -500.0, 0.0])
     assert pick_line(picture, eye, end - eye) == 3
     assert tab.errors == []
 
 
-def test_the_part_of_a_scene_is_drawn_as_the_app_opens(browser: "Browser") -> None:
+def test_the_part_of_a_scene_is_drawn_as_the_app_opens(browser):
     with Viewer(load_scene("part_on_dvf5000")) as viewer:
         tab = open_page(viewer, browser)
         tab.until(lambda: drawn_part(tab))

@@ -1,44 +1,32 @@
 """Times at which panels are rendered again, by a clock of the test."""
 
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
 from warpspace.app.panels.panel import PAUSE_S, Panel, Refresh
-from warpspace.app.server.refresh_scheduler import (
-    IDLE_S,
-    MAX_DELAY_S,
-    THROTTLE_S,
-    RefreshScheduler,
-)
+from warpspace.app.server import refresh_scheduler
+from warpspace.app.server.refresh_scheduler import IDLE_S, MAX_DELAY_S, THROTTLE_S
 
-ANY: Any = SimpleNamespace()
+ANY = None  # a picture that nothing depends on
 
 
 class _Panel(Panel):
-    def __init__(self, refresh: Refresh) -> None:
-        self.refresh, self.urgent = refresh, 0  # type: ignore[misc]
+    def __init__(self, refresh):
+        self.refresh, self.urgent = refresh, 0
 
-    def dependencies(self, picture: object) -> tuple[object, ...]:
+    def dependencies(self, picture):
         return (self.urgent,)
 
 
-class _Clock:
-    now = 100.0
-
-    def __call__(self) -> float:
-        return self.now
+@pytest.fixture
+def clock():
+    return SimpleNamespace(now=100.0)
 
 
 @pytest.fixture
-def clock() -> _Clock:
-    return _Clock()
-
-
-@pytest.fixture
-def scheduler(clock: _Clock) -> RefreshScheduler:
-    return RefreshScheduler(clock)
+def scheduler(clock):
+    return refresh_scheduler.RefreshScheduler(lambda: clock.now)
 
 
 PANELS = {refresh: _Panel(refresh) for refresh in Refresh}

@@ -138,6 +138,11 @@ def test_a_story_in_the_app_goes_from_step_to_step_and_back_to_before(browser):
         assert tab.errors == []
 
 
+def pointer_of(tab):
+    """Return number, name and place of another tab."""
+    return tab.latest.get("Page.pointer", [])
+
+
 def test_tabs_of_a_shared_review_see_each_others_notes_and_pointers():
     with Viewer(START.scene, shared=True) as viewer, dial(viewer) as mine, dial(viewer) as yours:
         one, other = Wire(mine), Wire(yours)
@@ -150,12 +155,12 @@ def test_tabs_of_a_shared_review_see_each_others_notes_and_pointers():
         for hostile in ("1,2,3", "nan,0,0,0,0,1", "0,0,0,0,0,0", "x" * 5000, "1e300,0,0,1,1,1"):
             one.say("pointer:at", hostile)
         ray = f"0,-20,1.5,0,1,0\n{EVIL}"  # of those that follow too soon none is taken
-        assert other.read_until(lambda: one.say("pointer:at", ray) or any(other.pointer[2:]))
-        assert other.pointer[1] == " ".join(EVIL[:24].split())
-        assert other.pointer[2] == pytest.approx([0.0, -1.95, 1.5], abs=0.1)
+        assert other.read_until(lambda: one.say("pointer:at", ray) or any(pointer_of(other)[2:]))
+        assert pointer_of(other)[1] == " ".join(EVIL[:24].split())
+        assert pointer_of(other)[2] == pytest.approx([0.0, -1.95, 1.5], abs=0.1)
         mine.close()
-        assert other.read_until(lambda: other.pointer[2] is None)
-        assert one.pointer == []
+        assert other.read_until(lambda: pointer_of(other)[2] is None)
+        assert pointer_of(one) == []
         end_work(viewer)
 
 

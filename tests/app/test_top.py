@@ -9,16 +9,9 @@ from app.parts import Alone, wait
 from warpspace.app.documents.output_services import Services
 from warpspace.app.documents.scene_file import SceneList, open_link
 from warpspace.app.documents.transfers import unpack
+from warpspace.app.panels import top_bar
 from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog
-from warpspace.app.panels.top_bar import (
-    COMMANDS,
-    HelpDialog,
-    PagePanel,
-    ScenesDialog,
-    StatePanel,
-    TopPanel,
-    key_events,
-)
+from warpspace.app.panels.page_panels import COMMANDS, HelpDialog
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
 from warpspace.scene.library import load_scene
@@ -30,7 +23,7 @@ HOSTILE = "<img src=x onerror=alert(1)>.csv"
 
 
 def test_undo_is_there_when_there_is_something_to_undo_and_says_what():
-    bar = Alone(TopPanel, STATE)
+    bar = Alone(top_bar.TopPanel, STATE)
     assert 'data-do="page:undo"' not in bar.html
     bar.store.apply(lambda state: state.with_amplitude("EAX", 7.0))
     assert "Undo: roll of X (Ctrl+Z)" in bar.html
@@ -42,7 +35,7 @@ def test_undo_is_there_when_there_is_something_to_undo_and_says_what():
 def test_scenes_are_chosen_by_title_and_escaped():
     hostile = replace(FIRST, name="other", title=HOSTILE, description=HOSTILE)
     scenes = SceneList({scene.title: scene for scene in (FIRST, SECOND, hostile)})
-    window = Alone(ScenesDialog, STATE, scenes=scenes)
+    window = Alone(top_bar.ScenesDialog, STATE, scenes=scenes)
     assert "<img" not in window.html
     assert window.html.count('aria-current="true"') == 1
     assert window.do("choose", "nothing of that name").scene is FIRST
@@ -51,11 +44,12 @@ def test_scenes_are_chosen_by_title_and_escaped():
 
 def test_every_key_is_there_once_and_none_without_ctrl_changes_the_model():
     keys = [key for one in COMMANDS for key in one.keys]
-    assert len(keys) == len(set(keys)) == len(key_events())
+    assert len(keys) == len(set(keys)) == len(top_bar.key_events())
     for command in COMMANDS:
         part, _, word = command.event.partition(":")
         if part in ("state", "page") and command.keys and "ctrl" not in command.keys[0]:
-            window = Alone({"state": StatePanel, "page": PagePanel}[part], STATE)
+            kinds = {"state": top_bar.StatePanel, "page": top_bar.PagePanel}
+            window = Alone(kinds[part], STATE)
             window.part.context.store.apply(lambda state: state.with_amplitude("EAX", 7.0))
             before = replace(window.store.state, exaggeration=None).resulting_scene()
             after = window.do(word, command.value)
@@ -94,7 +88,7 @@ def test_a_link_that_notes_make_too_large_leaves_them_out_and_says_so():
         window = Alone(FilesDialog, replace(STATE, review=tuple(notes[:count])))
         window.do("share")
         opened, _ = open_link(unpack(window.called[-1][1]), None)
-        assert len(opened.review) == expected
+        assert opened.review == tuple(notes[:expected])
         assert ["Notes not included" in one[0] for one in window.said] == [True] * (1 - expected)
         assert len(window.store.state.review) == count
 

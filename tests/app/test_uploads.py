@@ -1,15 +1,13 @@
 """Files of a page are parsed beside its session, one after the other."""
 
 import threading
-from collections.abc import Iterator
 
 import pytest
 
 from app.hostile import upload
 from app.wire import opened
-from warpspace.app.panels import part_panels
+from warpspace.app.panels import upload_panels
 from warpspace.exceptions import OptionError
-from warpspace.parts.workpiece import Workpiece
 from warpspace.resources import scenes_dir
 from warpspace.scene.library import load_scene
 
@@ -17,28 +15,32 @@ STL = (scenes_dir() / "parts" / "contour.stl").read_bytes()
 
 
 @pytest.fixture
-def held(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[threading.Event, list[str]]]:
+def held(monkeypatch):
     """Have a mesh parsed once an event is set; give that, and the names of the files so far."""
-    go_on, begun, original = threading.Event(), list[str](), part_panels.load_workpiece
+    go_on, begun, original = threading.Event(), [], upload_panels.load_workpiece
 
-    def load(name: str, unit: str | None, content: bytes) -> Workpiece:
+    def load(name, unit, content):
         begun.append(name)
         assert go_on.wait(60.0)
         if name == "bad.stl":
             raise OptionError("bad.stl: expected triangles")
         return original(name, unit, content)
 
-    monkeypatch.setattr(part_panels, "load_workpiece", load)
+    monkeypatch.setattr(upload_panels, "load_workpiece", load)
     yield go_on, begun
     go_on.set()
 
 
-def test_a_tab_goes_on_while_its_files_are_parsed_in_order(held) -> None:
+def send(wire, name):
+    event, value = upload(name, STL)
+    wire.say(event.replace("files:", "part:"), value)
+
+
+def test_a_tab_goes_on_while_its_files_are_parsed_in_order(held):
     go_on, begun = held
     with opened(load_scene("dvf5000_first")) as (wire, session):
         for name in ("bad.stl", "good.stl"):
-            event, value = upload(name, STL)
-            wire.say(event.replace("files:", "part:"), value)
+            send(wire, name)
         assert wire.read_until(lambda: bool(begun))
         wire.say("errors:set.EXX", "3")
         assert wire.read_until(lambda: 'data-text="3"' in wire.pieces["error.EXX"])
@@ -48,22 +50,20 @@ def test_a_tab_goes_on_while_its_files_are_parsed_in_order(held) -> None:
         assert begun == ["bad.stl", "good.stl"]
 
 
-def test_the_error_of_a_file_stands_in_its_section(held) -> None:
+def test_the_error_of_a_file_stands_in_its_section(held):
     go_on, _ = held
     go_on.set()
     with opened(load_scene("part_on_dvf5000")) as (wire, _):
         wire.say("page:task", "measure")
         wire.say("page:fold", "part")
-        event, value = upload("bad.stl", STL)
-        wire.say(event.replace("files:", "part:"), value)
+        send(wire, "bad.stl")
         assert wire.read_until(lambda: "bad.stl: expected triangles" in str(wire.pieces))
 
 
-def test_a_file_that_is_parsed_when_its_tab_closes_is_not_taken_in(held) -> None:
+def test_a_file_that_is_parsed_when_its_tab_closes_is_not_taken_in(held):
     go_on, begun = held
     with opened(load_scene("dvf5000_first")) as (wire, session):
-        event, value = upload("good.stl", STL)
-        wire.say(event.replace("files:", "part:"), value)
+        send(wire, "good.stl")
         assert wire.read_until(lambda: bool(begun))
         (job,) = [job for job in session.context.jobs if job.name == "Reading"]
         session.stop()

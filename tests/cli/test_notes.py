@@ -42,13 +42,9 @@ def test_a_note_is_added_with_its_numbers_and_the_file_stays_as_written(warpspac
     assert note.at == CORNER
     assert note.numbers == {"mean_um": 30.89, "max_um": 51.72, "here_um": 51.72}
     listed = warpspace("notes", mine, "--json").json["notes"]
-    checked = warpspace("check", mine, "--json").json["notes"]
-    assert [checked[0]["id"], checked[0]["stale"], checked[0]["now"]] == [
-        note.id,
-        False,
-        note.numbers,
-    ]
-    assert checked[0].items() <= listed[0].items()
+    (checked,) = warpspace("check", mine, "--json").json["notes"]
+    assert checked.items() >= {"id": note.id, "stale": False, "now": note.numbers}.items()
+    assert checked.items() <= listed[0].items()
     assert listed[0]["text"] == "Shim?"
     assert "R. Roe" in warpspace("notes", mine).out
 
@@ -186,15 +182,11 @@ def test_a_merge_says_what_else_differs_and_refuses_notes_that_do_not_fit(
 
 
 def test_notes_that_are_added_at_once_are_all_stored(mine):
-    commands = [
-        [sys.executable, "-m", "warpspace", "notes", str(mine), "--add", f"note {number}"]
-        for number in range(8)
-    ]
-    started = [subprocess.Popen(line, stdout=subprocess.PIPE) for line in commands]
-    for process in started:
-        process.communicate()
-    assert [process.returncode for process in started] == [0] * 8
-    assert {note.text for note in load_scene(mine).review} == {f"note {n}" for n in range(8)}
+    texts = [f"note {number}" for number in range(5)]
+    command = (sys.executable, "-m", "warpspace", "notes", mine, "--add")
+    started = [subprocess.Popen((*command, text)) for text in texts]
+    assert [process.wait(60) for process in started] == [0] * len(texts)
+    assert {note.text for note in load_scene(mine).review} == {*texts}
     assert list(mine.parent.iterdir()) == [mine]
 
 

@@ -15,7 +15,6 @@ from trimesh import Trimesh, creation
 import warpspace as api
 from warpspace import evaluate, load_scene
 from warpspace.cli import register_command
-from warpspace.cli.field_output import POINTS_AT_ONCE
 from warpspace.cli.main import BUNDLED, COMMANDS, cli
 from warpspace.cli.shared_options import spell_json
 from warpspace.exceptions import SceneError
@@ -43,16 +42,6 @@ def test_foreseen_failure_is_one_message_and_a_status(
     assert (result.status, result.out) == (status, "")
     assert message in result.err
     assert result.err.count("\n") == 1
-
-
-@pytest.mark.parametrize("failure", [ZeroDivisionError, RuntimeError])
-def test_unforeseen_failure_is_not_hidden(failure, monkeypatch, warpspace):
-    def fail(**options):
-        raise failure
-
-    monkeypatch.setattr(cli, "main", fail)
-    with pytest.raises(failure):
-        warpspace("check", "dvf5000_first")
 
 
 @pytest.mark.parametrize(
@@ -159,7 +148,7 @@ def test_full_disk_is_one_message():
 
 
 def test_reader_that_goes_away_is_no_error():
-    command = f"{sys.executable} -m warpspace field dvf5000_first --grid 21 --json | head -c 10"
+    command = f"{sys.executable} -m warpspace field dvf5000_first --grid 11 --json | head -c 10"
     result = subprocess.run(
         ["bash", "-c", command], capture_output=True, text=True, timeout=120, check=False
     )
@@ -175,16 +164,15 @@ def test_json_is_printed_in_pieces_and_is_one_object_with_every_point(monkeypatc
         return spell_json(value)
 
     monkeypatch.setattr("warpspace.cli.shared_options.spell_json", count)
-    result = warpspace("field", "dvf5000_first", "--grid", 23, "--json")
+    monkeypatch.setattr("warpspace.cli.field_output.POINTS_AT_ONCE", 150)
+    result = warpspace("field", "dvf5000_first", "--grid", 7, "--json")
     assert result.status == 0, result.err
-    assert sum(lengths) == 23**3 > 2 * POINTS_AT_ONCE >= 2 * max(lengths)
+    assert lengths == [150, 150, 43]
     assert result.out.count("\n") == 1
-    found = result.json
-    assert set(found) == {
-        *("points", "loop", "frame", "statistics", "statistics_nodes", "second_order_um")
-    }
-    errors = np.array([point["error_um"] for point in found["points"]])
-    expected = evaluate(load_scene("dvf5000_first"), grid=23).error_um.reshape(-1, 3)
+    keys = "points loop frame statistics statistics_nodes second_order_um"
+    assert {*result.json} == {*keys.split()}
+    errors = np.array([point["error_um"] for point in result.json["points"]])
+    expected = evaluate(load_scene("dvf5000_first"), grid=7).error_um.reshape(-1, 3)
     np.testing.assert_array_equal(errors, expected)
 
 

@@ -29,7 +29,7 @@ COMMANDS = {
     "contributions": ("contributions", "dvf5000_general"),
     "sobol": ("contributions", "dvf5000_proposed", "--sobol", "32"),
     "montecarlo": ("montecarlo", "dvf5000_proposed", "--samples", "500", "--limit", "40"),
-    "allocate": ("allocate", "dvf5000_first", "--limit", "40", "--samples", "2000"),
+    "allocate": ("allocate", "dvf5000_first", "--limit", "40", "--samples", "500"),
     "circular": ("test", "circular", "dvf5000_first", "--radius", "50"),
     "test": ("test", "positioning", "dvf5000_first"),
     "list of tests": ("test", "--list"),

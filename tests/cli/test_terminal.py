@@ -17,10 +17,18 @@ STEERING = ("\x1b", "\x9b", "\x07", "\u202e", "\u2066")
 MAIN = "from warpspace.cli import main; main()"
 
 
-def run(*arguments, code=MAIN, start=None, cwd=None, **variables):
+def run(
+    *arguments,
+    code=MAIN,
+    start=None,
+    cwd=None,
+    stdout=subprocess.PIPE,
+    stderr=subprocess.PIPE,
+    **variables,
+):
     command = [sys.executable, "-c", code, *arguments]
     how = {"cwd": cwd, "env": {**os.environ, **variables}, "preexec_fn": start}
-    return subprocess.run(command, capture_output=True, check=False, timeout=120, **how)
+    return subprocess.run(command, stdout=stdout, stderr=stderr, check=False, timeout=120, **how)
 
 
 def is_refusal(result, *fragments):
@@ -41,37 +49,37 @@ def test_steering_characters_are_spelt_out():
     assert not any(character in escape_json(text) for character in STEERING)
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        ("check",),
-        ("check", "--json"),
-        ("field", "--at", "X=0"),
-        ("gains",),
-        ("test circular", "--radius", "100"),
-        ("check", "--against", "own"),
-        ("montecarlo", "--samples", "100"),
-    ],
-    ids=lambda command: " ".join(command[:2]),
+COMMANDS = (
+    "check SCENE",
+    "check SCENE --json",
+    "field SCENE --at X=0",
+    "gains SCENE",
+    "test circular SCENE --radius 100",
+    "check SCENE --against own",
+    "montecarlo SCENE --samples 100",
 )
+
+
+def is_harmless(result):
+    return not any(character in result.out + result.err for character in STEERING)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
 def test_a_description_reaches_the_terminal_harmless(command, tmp_path, warpspace):
     path = tmp_path / "s.toml"
-    description = json.dumps(EVIL)
     half_widths = "default = { translation = 10, rotation = 20, squareness = 25 }"
-    head = f'title = "t"\ndescription = {description}\nmachine = "dvf5000"\n'
-    text = f"{head}[errors]\nEC0Y = 5\n[tolerances]\n{half_widths}"
-    path.write_text(text, "utf-8")
-    result = warpspace(*command[0].split(), path, *command[1:])
+    head = f'title = "t"\ndescription = {json.dumps(EVIL)}\nmachine = "dvf5000"\n'
+    path.write_text(f"{head}[errors]\nEC0Y = 5\n[tolerances]\n{half_widths}", "utf-8")
+    result = warpspace(*(path if word == "SCENE" else word for word in command.split()))
     assert result.status == 0, result.err
-    assert not any(character in result.out + result.err for character in STEERING)
+    assert is_harmless(result)
 
 
 def test_a_title_with_control_characters_is_refused_harmlessly(tmp_path, warpspace):
     path = tmp_path / "s.toml"
     path.write_text(f'title = {json.dumps(EVIL)}\nmachine = "dvf5000"\n', "utf-8")
     result = warpspace("check", path)
-    assert result.status == 2
-    assert not any(character in result.out + result.err for character in STEERING)
+    assert (result.status, is_harmless(result)) == (2, True)
 
 
 @pytest.mark.parametrize(
@@ -81,19 +89,19 @@ def test_a_title_with_control_characters_is_refused_harmlessly(tmp_path, warpspa
 )
 def test_a_refused_word_reaches_the_terminal_harmless(arguments, warpspace):
     result = warpspace(*arguments)
-    assert result.status == 2
-    assert not any(character in result.out + result.err for character in STEERING)
+    assert (result.status, is_harmless(result)) == (2, True)
 
 
-def test_a_file_name_that_is_no_text(tmp_path):
-    folder = os.fsencode(tmp_path)
-    (tmp_path / os.fsdecode(b"\xff.toml")).write_text('title = "t"\nmachine = "dvf5000"\n', "utf-8")
-    target = folder + b"/\xfe.csv"
-    done = run("export", folder + b"/\xff.toml", "--grid", "3", "-o", target)
-    assert done.returncode == 0, done.stderr
-    assert rb"\xfe.csv" in done.stdout
-    assert Path(os.fsdecode(target)).stat().st_size > 100
-    is_refusal(run("check", folder + b"/\xfd.toml"), r"\xfd.toml")
+def test_a_file_name_that_is_no_text(tmp_path, warpspace):
+    scene, target, missing = (
+        tmp_path / os.fsdecode(name) for name in (b"\xff.toml", b"\xfe.csv", b"\xfd.toml")
+    )
+    scene.write_text('title = "t"\nmachine = "dvf5000"\n', "utf-8")
+    done = warpspace("export", scene, "--grid", "3", "-o", target)
+    assert done.status == 0, done.err
+    assert r"\xfe.csv" in done.out
+    assert target.stat().st_size > 100
+    warpspace("check", missing).refused(r"\xfd.toml")
 
 
 def test_a_working_folder_that_is_gone(tmp_path):
@@ -187,13 +195,13 @@ def test_a_defect_shows_its_traceback_as_plain_text():
     code = """
 from warpspace.cli.main import cli, main
 def fail(**options):
-    raise ValueError(chr(27) + "[31m")
+    raise RuntimeError(chr(27) + "[31m")
 cli.main = fail
 main()
 """
     done = run(code=code)
     assert done.returncode == 1
-    assert done.stderr.strip().endswith(b"ValueError: \\x1b[31m")
+    assert done.stderr.strip().endswith(b"RuntimeError: \\x1b[31m")
 
 
 @pytest.mark.parametrize(
@@ -224,17 +232,14 @@ def test_a_stream_that_is_closed_at_the_start(arguments, status, closed, tmp_pat
 def test_a_reader_that_has_ended(arguments):
     reading, writing = os.pipe()
     os.close(reading)
-    command = [sys.executable, "-c", MAIN, *arguments]
-    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, check=False, timeout=120)
+    assert run(*arguments, stdout=writing).stderr == b""
     os.close(writing)
-    assert done.stderr == b""
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
 def test_a_message_that_cannot_be_written_changes_no_exit_status():
     with Path("/dev/full").open("w") as full:
-        command = [sys.executable, "-c", MAIN, "check", "nothing"]
-        assert subprocess.run(command, stderr=full, check=False, timeout=120).returncode == 2
+        assert run("check", "nothing", stderr=full).returncode == 2
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])

@@ -1,21 +1,23 @@
-"""The documentation site holds every page, command, tab and example; its links lead somewhere."""
+"""The documentation holds every page, command, tab and example; links and answers are right."""
 
 import ast
+import doctest
 import re
 import runpy
 import shlex
 import sys
 import tomllib
+from importlib import import_module
 from unittest.mock import MagicMock
 
 import pytest
 
 import warpspace
 from doc_pages import DOCS, ROOT, anchors, blocks, entries, links, pages, section
+from warpspace.app.panels.page_panels import COMMANDS as KEYS
 from warpspace.app.panels.page_panels import build_panels
 from warpspace.app.panels.panel import Section
-from warpspace.app.panels.top_bar import COMMANDS as KEYS
-from warpspace.app.state.app_state import TASKS
+from warpspace.app.state.look import TASKS
 from warpspace.cli.main import COMMANDS
 from warpspace.kinematics.model import convention_names
 from warpspace.machine.curves.registry import curve_kinds
@@ -25,24 +27,21 @@ from warpspace.scene.schema import CONVENTION, POINTS, VIEW
 pytestmark = pytest.mark.nightly  # `make docs` runs them, too
 WORDS_OF_A_SECTION = 10
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+WITH_BLOCKS = [page for page in pages() if blocks(page.read_text("utf-8"), "pycon")]
+SOURCES = sorted((ROOT / "src").rglob("*.py"))
+MODULES = [path for path in SOURCES if ">>> " in path.read_text("utf-8")]
 
 
 def site_part(name):
     return runpy.run_path(str(DOCS / "_ext" / f"{name}.py"))
 
 
-@pytest.fixture
-def configuration(monkeypatch):
+def test_the_configuration_loads_and_finds_what_it_names(monkeypatch):
     monkeypatch.setattr(sys, "path", list(sys.path))
-    return runpy.run_path(str(DOCS / "conf.py"))
-
-
-def test_the_configuration_loads_and_finds_what_it_names(configuration):
+    configuration = runpy.run_path(str(DOCS / "conf.py"))
     assert configuration["version"] == warpspace.__version__
-    for name in configuration["html_css_files"]:
-        assert (DOCS / "_static" / name).is_file()
-    for folder in configuration["templates_path"]:
-        assert (DOCS / folder).is_dir()
+    assert all((DOCS / "_static" / name).is_file() for name in configuration["html_css_files"])
+    assert all((DOCS / folder).is_dir() for folder in configuration["templates_path"])
 
 
 def test_the_pythons_that_are_promised_are_those_that_were_tried():
@@ -61,10 +60,10 @@ def test_every_page_is_in_a_table_of_contents():
     contained = {(DOCS / "index.md").resolve()}
     for page in pages():
         for entry in entries(page):
-            found = [path.resolve() for path in page.parent.glob(f"{entry}.md")]
+            entered = [path.resolve() for path in page.parent.glob(f"{entry}.md")]
             coming = "*" in entry or page.parent.joinpath(entry).name == "index"
-            assert found or coming, f"{page.name}: there is no page {entry}"
-            contained.update(found)
+            assert entered or coming, f"{page.name}: there is no page {entry}"
+            contained.update(entered)
     missing = {path.resolve() for path in pages() if DOCS in path.parents} - contained
     assert not missing, (
         f"{sorted(path.name for path in missing)}: in no table of contents; name them in"
@@ -73,9 +72,8 @@ def test_every_page_is_in_a_table_of_contents():
 
 
 def test_the_reference_has_every_public_name_and_every_room():
-    listed = set(
-        re.findall(r"^   (\w+)$", (DOCS / "reference/index.md").read_text("utf-8"), re.MULTILINE)
-    )
+    reference = (DOCS / "reference/index.md").read_text("utf-8")
+    listed = set(re.findall(r"^   (\w+)$", reference, re.MULTILINE))
     assert {name for name in warpspace.__all__ if name != "__version__"} <= listed
     rooms = {path.parent.name for path in (ROOT / "src/warpspace").glob("*/__init__.py")}
     assert rooms - {"app", "cli"} <= listed, "name the package in docs/reference/index.md"
@@ -84,15 +82,10 @@ def test_the_reference_has_every_public_name_and_every_room():
 def test_every_command_has_a_how_to():
     for name in COMMANDS:
         page = DOCS / "commands" / f"{name}.md"
-        assert page.is_file(), (
-            f"there is no docs/commands/{name}.md: write what a user does with `warpspace {name}`;"
-            " the options are added by the site"
-        )
+        assert page.is_file(), f"write what a user does with `warpspace {name}`: {page}"
         text = page.read_text("utf-8")
-        assert re.search(rf"^# How to .*: `{name}`$", text, re.MULTILINE), page.name
-        assert re.search(rf"^warpspace {name}\b", "".join(blocks(text, "sh")), re.MULTILINE), (
-            page.name
-        )
+        assert re.search(rf"^# How to .*: `{name}`$", text, re.MULTILINE), name
+        assert re.search(rf"^warpspace {name}\b", "".join(blocks(text, "sh")), re.MULTILINE), name
     assert {path.stem for path in (DOCS / "commands").glob("*.md")} == {*COMMANDS, "index"}
     listed = {file for file, _ in links(DOCS / "commands" / "index.md")}
     assert {f"{name}.md" for name in COMMANDS} <= listed
@@ -130,17 +123,12 @@ def test_every_command_of_the_page_and_its_key_are_named():
 
 
 def command_lines():
-    found = []
+    lines = set()
     for page in pages():
         text = page.read_text("utf-8")
-        found += [
-            line
-            for block in blocks(text, "sh")
-            for line in block.splitlines()
-            if "warpspace " in line
-        ]
-        found += re.findall(r"`(warpspace [a-z][^`]*)`", " ".join(text.split()))
-    return sorted({line.strip() for line in found if line.strip().startswith("warpspace ")})
+        lines.update(map(str.strip, "\n".join(blocks(text, "sh")).splitlines()))
+        lines.update(re.findall(r"`(warpspace [a-z][^`]*)`", " ".join(text.split())))
+    return sorted(line.strip() for line in lines if line.startswith("warpspace "))
 
 
 @pytest.mark.parametrize("line", command_lines())
@@ -149,10 +137,8 @@ def test_commands_of_the_pages_are_understood(line):
     if words[0].startswith("-") or words[0].isupper():
         return
     assert words[0] in COMMANDS, line
-    if (
-        "…" in words or len(words) == 1 or all(word.startswith("-") for word in words[1:])
-    ):  # a command that is only named
-        return
+    if "…" in words or all(word.startswith("-") for word in words[1:]):
+        return  # a command that is only named
     if re.search(r"\b[A-Z]{2,}\b", " ".join(words[1:])) and "=" not in line:
         return  # a form with placeholders
     # as the program itself calls it: click keeps the first help option that a command is given
@@ -240,15 +226,34 @@ def test_every_picture_that_is_linked_exists_and_every_other_picture_is_linked()
 def test_pictures_are_small():
     sizes = [path.stat().st_size for path in (ROOT / "docs" / "images").glob("*.png")]
     assert sum(sizes) < 3.5e6
-    machines = [p.stat().st_size for p in (ROOT / "assets/machines").glob("*/picture.png")]
-    assert max(machines) < 2e5
+    machines = (ROOT / "assets/machines").glob("*/picture.png")
+    assert max(path.stat().st_size for path in machines) < 2e5
 
 
 def test_every_kind_of_curve_and_every_convention_is_documented():
+    forms = [f"{{ {form[0]}" for kind in curve_kinds() for form in kind.forms]
     for page in ("docs/scenes.md", "CONVENTIONS.md"):
         text = (ROOT / page).read_text("utf-8")
-        for kind in curve_kinds():
-            for form in kind.forms:
-                assert f"{{ {form[0]}" in text, (page, form)
-        for name in convention_names():
-            assert f'"{name}"' in text, (page, name)
+        for spelling in (*forms, *(f'"{name}"' for name in convention_names())):
+            assert spelling in text, (page, spelling)
+
+
+@pytest.mark.parametrize("page", WITH_BLOCKS, ids=lambda page: page.name)
+def test_answers_of_a_page_are_those_of_python(page):
+    text = "\n".join(blocks(page.read_text("utf-8"), "pycon"))
+    test = doctest.DocTestParser().get_doctest(text, {}, page.name, str(page), 0)
+    assert test.examples
+    assert doctest.DocTestRunner(verbose=False).run(test).failed == 0
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.stem)
+def test_answers_of_docstrings_are_those_of_python(path):
+    name = ".".join(path.relative_to(ROOT / "src").with_suffix("").parts)
+    result = doctest.testmod(import_module(name.removesuffix(".__init__")), verbose=False)
+    assert (result.attempted > 0, result.failed) == (True, 0)
+
+
+def test_pages_and_public_verbs_have_examples():
+    for name in ("load_scene", "evaluate", "run_test", "calibrate"):
+        assert ">>> " in (getattr(warpspace, name).__doc__ or ""), name
+    assert WITH_BLOCKS

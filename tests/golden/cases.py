@@ -27,6 +27,7 @@ _EACH = {
     "glb": "export {scene} --grid 3 -o {out}/field.glb",
     "test-diagonals": "test diagonals {scene} --json",
 }
+_TESTS = ("ball-plate", "circular", "cone-frustum", "r-test", "squareness", "straightness")
 _ONCE = {
     "scenes": "list scenes",
     "scenes-json": "list scenes --json",
@@ -66,17 +67,7 @@ _ONCE = {
     "adjust-none": "adjust dvf5000_nominal --grid 3",
     "allocate-fixed": f"allocate dvf5000_proposed --limit 60 --fixed EXX,eyx --fixed EZX {FEW}"
     " --cost EA0Z=20,EB0Z=20 --loop relative --json",
-    **{
-        f"test-{name}": f"test {name} dvf5000_first --json"
-        for name in (
-            "ball-plate",
-            "circular",
-            "cone-frustum",
-            "r-test",
-            "squareness",
-            "straightness",
-        )
-    },
+    **{f"test-{name}": f"test {name} dvf5000_first --json" for name in _TESTS},
     "calibrate": "calibrate fork_head_bc --data tcp_on.csv --kind sphere-tcp --next 1"
     " --csv {out}/r.csv",
     "calibrate-priors": "calibrate fork_head_bc --data tcp_on.csv --kind sphere-tcp --priors",
@@ -87,13 +78,10 @@ _ONCE = {
     "bad-option": "adjust dvf5000_first --limit fourty",
 }
 CASES: dict[str, str] = {
-    **{
-        f"{name}-{scene}": line.replace("{scene}", scene)
-        for name, line in _EACH.items()
-        for scene in SCENES
-    },
-    **_ONCE,
-}
+    f"{name}-{scene}": line.replace("{scene}", scene)
+    for name, line in _EACH.items()
+    for scene in SCENES
+} | _ONCE
 DAILY = frozenset(f"{name}-dvf5000_first" for name in _EACH) | {
     "scenes", "thesis-json", "new-machine", "compare-text", "contributions-text", "montecarlo-text",
     "allocate-text", "concepts-text", "circular-text", "rotary", "klipper", "convert",

@@ -19,19 +19,17 @@ from golden.cases import CASES
 from warpspace.cli.main import cli, main
 from warpspace.exceptions import WarpspaceError
 
-KEPT = Path(__file__).parent / "kept"
-REFUSALS = Path(__file__).parent / "refusals.txt"
+HERE = Path(__file__).parent
+KEPT = HERE / "kept"
+REFUSALS = HERE / "refusals.txt"
 """Command lines that cannot be, each with the message it is refused with."""
-INPUTS = Path(__file__).parent / "refused"
+INPUTS = HERE / "refused"
 """Files that cannot be used. Each text holds a command, the files it needs, the last of which is
 the bad one, and below "=== name" what it holds, with the message of its refusal after ">>>"."""
-READ = Path(__file__).parent / "read"
+READ = HERE / "read"
 """Files that are imported, in texts like those; below ">>>" what is said and the errors written."""
 ROOT = Path(__file__).resolve().parents[2]
-MOST_LINES = 60
-"""Of a text or a table; the rest is counted."""
-MOST_VALUES = 12
-"""Of a list of numbers."""
+MOST_LINES, MOST_VALUES = 60, 12  # of a text or table, and of a list; the rest is counted
 NUMBER = re.compile(r"(?<![\w.])[-+−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 
 
@@ -121,11 +119,11 @@ def _leaves(value: Any, path: str) -> Any:
     elif isinstance(value, list) and any(isinstance(part, dict | list) for part in value):
         for index, part in enumerate(value):
             yield from _leaves(part, f"{path}[{index}]")
-    elif isinstance(value, list) and len(value) > MOST_VALUES:
-        some = value[:: len(value) // MOST_VALUES]
-        yield f"{path} = {json.dumps(some, ensure_ascii=False)} of {len(value)}"
     else:
-        yield f"{path} = {json.dumps(value, ensure_ascii=False)}"
+        is_long = isinstance(value, list) and len(value) > MOST_VALUES
+        shown = value[:: len(value) // MOST_VALUES] if is_long else value
+        count = f" of {len(value)}" if is_long else ""
+        yield f"{path} = {json.dumps(shown, ensure_ascii=False)}{count}"
 
 
 def _short(lines: list[str], most: int) -> list[str]:

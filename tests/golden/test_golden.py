@@ -2,19 +2,16 @@
 
 import pytest
 
+from golden import running
 from golden.cases import CASES, DAILY
-from golden.running import (
-    INPUTS,
-    KEPT,
-    READ,
-    differences,
-    input_cases,
-    refusals,
-    run_case,
-    run_input,
-    run_read,
-    run_refused,
-)
+from golden.running import INPUTS, KEPT, READ, differences
+
+
+def assert_refused(outcome, kept, folder, files):
+    status, printed, message = outcome
+    assert (status, printed) == (2, "")
+    assert not differences(kept, message)
+    assert {path.name for path in folder.iterdir()} == set(files)
 
 
 @pytest.mark.parametrize(
@@ -23,16 +20,13 @@ from golden.running import (
 )
 def test_it_says_and_writes_what_it_did(name, tmp_path):
     kept = (KEPT / f"{name}.txt").read_text("utf-8")
-    found = differences(kept, run_case(name, tmp_path))
-    assert not found, f"{CASES[name]}\n" + "\n".join(found[:12])
+    lines = differences(kept, running.run_case(name, tmp_path))
+    assert not lines, f"{CASES[name]}\n" + "\n".join(lines[:12])
 
 
-@pytest.mark.parametrize(("line", "kept"), refusals().items())
+@pytest.mark.parametrize(("line", "kept"), running.refusals().items())
 def test_what_cannot_be_is_refused_with_its_message(line, kept, tmp_path):
-    status, printed, said = run_refused(line, tmp_path)
-    assert (status, printed) == (2, "")
-    assert not differences(kept, said)
-    assert list(tmp_path.iterdir()) == []
+    assert_refused(running.run_refused(line, tmp_path), kept, tmp_path, ())
 
 
 def cases_of(folder):
@@ -41,22 +35,19 @@ def cases_of(folder):
         [
             pytest.param(*case, id=f"{path.stem}: {name}")
             for path in sorted(folder.glob("*.txt"))
-            for name, *case in input_cases(path)
+            for name, *case in running.input_cases(path)
         ],
     )
 
 
 @cases_of(READ)
 def test_a_file_is_read_as_it_was(command, files, kept, tmp_path):
-    assert not differences(kept, run_read(command, files, tmp_path))
+    assert not differences(kept, running.run_read(command, files, tmp_path))
 
 
 @cases_of(INPUTS)
 def test_a_file_that_cannot_be_used_is_refused_with_its_message(command, files, kept, tmp_path):
-    status, printed, said = run_input(command, files, tmp_path)
-    assert (status, printed) == (2, "")
-    assert not differences(kept, said)
-    assert {path.name for path in tmp_path.iterdir()} == set(files)
+    assert_refused(running.run_input(command, files, tmp_path), kept, tmp_path, files)
 
 
 def test_nothing_is_kept_of_cases_that_are_gone():

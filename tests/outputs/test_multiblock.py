@@ -14,6 +14,7 @@ from warpspace.picture.model import evaluate_picture
 from warpspace.picture.traces import trace_lines
 
 ROOT = Path(__file__).parents[2]
+FIRST = warpspace.load_scene("dvf5000_first")
 SCENES = ("dvf5000_first", "teach_wobbling_table", "dvf5000_nominal")
 
 
@@ -33,13 +34,11 @@ def test_numbers_are_those_of_evaluate(name, loop):
     assert np.array_equal(nodes(nominal, nominal.points), field.nominal_mm)
     expected = deform(field.nominal_mm, field.error_um, 700.0)
     assert nodes(deformed, deformed.points) == pytest.approx(expected, abs=1e-9)
+    tilt = np.linalg.norm(field.orientation_urad, axis=-1)
     for mesh in (nominal, deformed):
-        found = mesh.point_data
-        assert np.array_equal(nodes(mesh, found["error_um"]), field.error_um)
-        assert np.array_equal(nodes(mesh, found["norm_um"]), field.norm_um)
-        assert np.array_equal(nodes(mesh, found["orientation_urad"]), field.orientation_urad)
-        tilt = np.linalg.norm(field.orientation_urad, axis=-1)
-        assert nodes(mesh, found["tilt_urad"]) == pytest.approx(tilt, abs=1e-9)
+        for name in ("error_um", "norm_um", "orientation_urad"):
+            assert np.array_equal(nodes(mesh, mesh.point_data[name]), getattr(field, name))
+        assert nodes(mesh, mesh.point_data["tilt_urad"]) == pytest.approx(tilt, abs=1e-9)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -56,14 +55,10 @@ def test_the_parts_add_up_to_the_error(name, loop):
         assert np.abs(total - found["error_um"]).max() < 1e-9
 
 
-def test_parts_are_given_on_request_only():
-    blocks = warpspace.to_pyvista(warpspace.load_scene("dvf5000_first"), grid=3)
-    assert [key for key in blocks["deformed"].point_data if key.startswith("part_")] == []
-
-
-def test_the_surface_is_the_outside_of_the_deformed_volume():
-    blocks = warpspace.to_pyvista(warpspace.load_scene("dvf5000_first"), grid=5)
+def test_the_surface_is_the_outside_of_the_deformed_volume_without_parts():
+    blocks = warpspace.to_pyvista(FIRST, grid=5)
     surface, volume = blocks["surface"], blocks["deformed"]
+    assert [key for key in volume.point_data if key.startswith("part_")] == []
     assert surface.n_points == 5**3 - 3**3
     assert surface.volume == pytest.approx(volume.volume, rel=1e-3)
     at = [volume.find_closest_point(point) for point in surface.points]
@@ -71,10 +66,12 @@ def test_the_surface_is_the_outside_of_the_deformed_volume():
     assert np.array_equal(surface.point_data["error_um"], volume.point_data["error_um"][at])
 
 
-def test_traces_and_bodies_are_there():
-    scene = warpspace.load_scene("dvf5000_first")
-    drawing = evaluate_picture(scene, exaggeration="auto")
-    blocks = warpspace.to_pyvista(scene, grid=3)
+def test_traces_bodies_and_field_data_are_there():
+    drawing = evaluate_picture(FIRST, exaggeration="auto")
+    blocks = warpspace.to_pyvista(FIRST, grid=3)
+    assert blocks.field_data["exaggeration"][0] == drawing.exaggeration
+    assert blocks.field_data["scene"][0] == "dvf5000_first"
+    assert blocks.field_data["program"][0] == f"warpspace {warpspace.__version__}"
     traces, lines = blocks["traces"], trace_lines(drawing.traces)
     assert len(traces) == 2 * len(lines) > 0
     for number, drawn in enumerate(lines):
@@ -86,19 +83,11 @@ def test_traces_and_bodies_are_there():
         assert np.array_equal(actual.point_data["error_um"], drawn.error_um)
         shift = deform(drawn.nominal_mm, drawn.error_um, drawing.exaggeration)
         assert np.allclose(actual.points, shift)
-    bodies = load_bodies(scene.machine)
+    bodies = load_bodies(FIRST.machine)
     assert blocks["bodies"].keys() == [body.name for body in bodies]
     for body, mesh in zip(bodies, blocks["bodies"], strict=True):
         assert mesh.n_cells == len(body.triangles)
         assert (mesh.cell_data["colour"] == body.colour).all()
-
-
-def test_the_field_data_say_what_it_is():
-    scene = warpspace.load_scene("dvf5000_first")
-    said = warpspace.to_pyvista(scene, grid=3).field_data
-    assert said["exaggeration"][0] == evaluate_picture(scene, exaggeration="auto").exaggeration
-    assert said["scene"][0] == "dvf5000_first"
-    assert said["program"][0] == f"warpspace {warpspace.__version__}"
 
 
 @pytest.mark.render

@@ -25,31 +25,27 @@ def children():
 
 
 def test_a_task_of_a_process_that_died_is_done_again(tmp_path):
-    pool = ProcessPool(2, losses=1)
-    futures = [pool.submit(square, number, str(tmp_path), "once") for number in range(8)]
-    assert [future.result(60) for future in futures] == [number**2 for number in range(8)]
+    with ProcessPool(2, losses=1) as pool:
+        futures = [pool.submit(square, number, str(tmp_path), "once") for number in range(8)]
+        assert [future.result(60) for future in futures] == [number**2 for number in range(8)]
     assert (tmp_path / "killed").exists()
-    pool.shutdown()
 
 
 def test_processes_that_die_too_often_are_not_replaced(tmp_path):
-    pool = ProcessPool(1, losses=2)
-    for _ in range(2):  # the second time no process is started any more
-        with pytest.raises(
-            WorkersLostError, match=r"^worker processes died 3 times \(out of memory"
-        ):
-            pool.submit(square, 3, str(tmp_path), "always").result(60)
-    pool.shutdown()
+    said = r"^worker processes died 3 times \(out of memory"
+    with ProcessPool(1, losses=2) as pool:
+        for _ in range(2):  # the second time no process is started any more
+            with pytest.raises(WorkersLostError, match=said):
+                pool.submit(square, 3, str(tmp_path), "always").result(60)
 
 
 @pytest.mark.parametrize("size", [100, 1_000_000])
 def test_half_an_answer_is_not_waited_for(size, tmp_path):
-    pool = ProcessPool(2)
-    other = pool.submit(square, 2, str(tmp_path), "never")
-    with pytest.raises(WorkersLostError, match="died once"):
-        pool.submit(die_while_answering, size).result(60)
-    assert other.result(60) == 4
-    pool.shutdown()
+    with ProcessPool(2) as pool:
+        other = pool.submit(square, 2, str(tmp_path), "never")
+        with pytest.raises(WorkersLostError, match="died once"):
+            pool.submit(die_while_answering, size).result(60)
+        assert other.result(60) == 4
 
 
 def test_killing_a_pool_does_not_wait_for_its_tasks(tmp_path):
@@ -68,22 +64,21 @@ def test_killing_a_pool_does_not_wait_for_its_tasks(tmp_path):
 
 
 def test_a_process_is_replaced_after_its_number_of_tasks():
-    pool = ProcessPool(1, tasks_per_process=2)
-    pids = [pool.submit(os.getpid).result(60) for _ in range(4)]
+    with ProcessPool(1, tasks_per_process=2) as pool:
+        pids = [pool.submit(os.getpid).result(60) for _ in range(4)]
     assert pids[0] == pids[1] != pids[2] == pids[3]
-    pool.shutdown()
 
 
 def test_what_cannot_be_sent_is_an_error_and_ends_nothing(tmp_path):
-    pool = ProcessPool(1)
-    with pytest.raises(TypeError, match="pickle"):  # the task
-        pool.submit(square, threading.Lock(), "", "").result(60)
-    with pytest.raises(TypeError, match="pickle"):  # what it returns
-        pool.submit(threading.Lock).result(60)
-    with pytest.raises(TypeError, match="missing 1 required"):  # what it raises
-        pool.submit(refuse, "x").result(60)
-    with pytest.raises(ZeroDivisionError) as caught:
-        pool.submit(divmod, 1, 0).result(60)
-    assert "in a worker process" in caught.value.__notes__[0]
-    assert pool.submit(square, 2, str(tmp_path), "never").result(60) == 4
-    pool.shutdown()
+    with ProcessPool(1) as pool:
+        for said, *task in (
+            ("pickle", square, threading.Lock(), "", ""),  # the task
+            ("pickle", threading.Lock),  # what it returns
+            ("missing 1 required", refuse, "x"),  # what it raises
+        ):
+            with pytest.raises(TypeError, match=said):
+                pool.submit(*task).result(60)
+        with pytest.raises(ZeroDivisionError) as caught:
+            pool.submit(divmod, 1, 0).result(60)
+        assert "in a worker process" in caught.value.__notes__[0]
+        assert pool.submit(square, 2, str(tmp_path), "never").result(60) == 4

@@ -28,13 +28,13 @@ def test_response_is_the_derivative_of_the_exact_readings(scene_name, name):
     np.testing.assert_allclose(response @ amplitudes, simulate(scene, plan, exact=False))
     for column, key in enumerate(keys):
         span = scene.axis_span(parameter(key).axis)
-        functions = scene.errors.functions
-        shape = ErrorSet({key: functions[key]} if key in functions else {})
-        one, other = (
-            simulate(replace(scene, errors=shape.with_amplitude(key, size, span)), plan)
-            for size in (0.5, -0.5)
+        curves = [
+            scene.errors.with_amplitude(key, size, span).functions[key] for size in (0.5, -0.5)
+        ]
+        up, down = (
+            simulate(replace(scene, errors=ErrorSet({key: curve})), plan) for curve in curves
         )
-        np.testing.assert_allclose(one - other, response[:, column], atol=2e-7)
+        np.testing.assert_allclose(up - down, response[:, column], atol=2e-7)
 
 
 @pytest.mark.parametrize("name", bench_names())

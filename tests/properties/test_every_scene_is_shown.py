@@ -13,12 +13,7 @@ import glb
 from app.parts import lone_part
 from random_scenes import scenes
 from warpspace import to_pyvista
-from warpspace.app.documents.legend import (
-    legend_html,
-    numbers_words,
-    subject_words,
-    within_limit_words,
-)
+from warpspace.app.documents import legend
 from warpspace.app.drawing.around import draw_labels, draw_surroundings
 from warpspace.app.drawing.box import box, ghost_dashes
 from warpspace.app.drawing.camera import VIEWS, fit_camera
@@ -59,21 +54,12 @@ def server():
 
 @st.composite
 def states(draw):
-    opened = replace(start_state(draw(scenes())), nodes=SIDE_NODES)
-    look = replace(
-        opened.look,
-        surface=draw(st.sampled_from(list(SURFACES))),
-        quantity=draw(st.sampled_from([*QUANTITIES])),
-        isolines=True,
-        arrows=True,
-    )
-    state = replace(
-        opened,
-        look=look,
-        loop=draw(st.sampled_from(Loop)),
-        component=draw(st.sampled_from(("norm", "z"))),
-        machine=replace(opened.machine, shown=draw(st.booleans())),
-    )
+    state = replace(start_state(draw(scenes())), nodes=SIDE_NODES)
+    surface, quantity = draw(st.sampled_from([*SURFACES])), draw(st.sampled_from([*QUANTITIES]))
+    look = replace(state.look, surface=surface, quantity=quantity, isolines=True, arrows=True)
+    loop, component = draw(st.sampled_from(Loop)), draw(st.sampled_from(("norm", "z")))
+    shown = replace(state.machine, shown=draw(st.booleans()))
+    state = replace(state, look=look, loop=loop, component=component, machine=shown)
     if draw(st.booleans()):
         pinned = with_pin(state)
         shown = draw(st.sampled_from(("a", "b", "difference")))
@@ -86,13 +72,8 @@ def states(draw):
 def test_every_state_has_a_finite_picture(server, state):
     picture = LiveModel().evaluate(state)
     _check_finite(picture)
-    shapes = {
-        **box(picture),
-        **draw_surroundings(picture),
-        **draw_labels(picture),
-        **machine(picture, {}),
-    }
-    Nodes(server.scene).draw(shapes)
+    shapes = box(picture) | draw_surroundings(picture) | draw_labels(picture)
+    Nodes(server.scene).draw(shapes | machine(picture, {}))
     for view in VIEWS.values():
         place = fit_camera(axes_room_mm(picture), 1.6, view)
         assert np.isfinite(place.position).all()
@@ -103,20 +84,16 @@ def _check_finite(picture):
     assert math.isfinite(picture.exaggeration)
     assert picture.size_mm > 0.0
     for field in fields(picture.statistics):
-        found = getattr(picture.statistics, field.name)
-        numbers = list(found.values()) if isinstance(found, dict) else found
+        value = getattr(picture.statistics, field.name)
+        numbers = list(value.values()) if isinstance(value, dict) else value
         assert np.isfinite(numbers).all(), field.name
     for mesh in (map_mesh(picture), line_mesh(picture)):
         assert len(mesh.vertices_mm) > 1
         assert len(mesh.triangles) > 0
         assert np.isfinite(mesh.vertices_mm).all()
         assert np.isfinite(mesh.values).all()
-    for pieces in (
-        grid_pieces(picture),
-        edge_pieces(picture),
-        isoline_pieces(picture),
-        ghost_dashes(picture),
-    ):
+    for build in (grid_pieces, edge_pieces, isoline_pieces, ghost_dashes):
+        pieces = build(picture)
         assert pieces.shape[1:] == (2, 3)
         assert np.isfinite(pieces).all()
 
@@ -128,8 +105,10 @@ def test_every_panel_has_words_for_it(state):
     at = {name: 0.0 for name in state.scene.machine.axes if is_linear(name)}
     asked = replace(picture, state=with_picked(state, Picked(at)))
     said = [
-        legend_html(picture),
-        " ".join((numbers_words(picture), within_limit_words(picture)[0], *subject_words(picture))),
+        legend.legend_html(picture),
+        legend.numbers_words(picture),
+        legend.within_limit_words(picture)[0],
+        *legend.subject_words(picture),
         lone_part(RotarySection).body(picture),
         lone_part(ConventionsSection).body(picture),
         *WorstPanel(None).render(asked).values(),

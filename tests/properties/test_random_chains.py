@@ -11,7 +11,6 @@ from warpspace.machine.definition import build_machine
 MACHINES = 200
 LETTERS = "XYZUVWABC"
 OWN = {"tool": "tool_point_mm", "workpiece": "workpiece_point_mm"}
-ALONG = {"X": 0, "Y": 1, "Z": 2, "U": 0, "V": 1, "W": 2, "A": 0, "B": 1, "C": 2}
 
 
 def random_machine(rng):
@@ -54,7 +53,7 @@ def product(machine, model, side, at, errors):
         result = result @ rigid(
             Rotation.from_euler("xyz", axis.rotation_deg, degrees=True), axis.offset_mm
         )
-        steps = axis.direction * at[name] * np.eye(3)[ALONG[name[0]]]
+        steps = axis.direction * at[name] * np.eye(3)[LETTERS.index(name[0]) % 3]
         move = (
             rigid(Rotation.from_rotvec(steps, degrees=True), np.zeros(3))
             if name[0] in "ABC"

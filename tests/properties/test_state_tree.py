@@ -76,9 +76,8 @@ def done(state, path, text):
     if path != NOTE:
         return put(state, path, text).without_notes()
     at = dict.fromkeys(state.scene.machine.axes, 1.5)
-    note = Note(
-        text=clean(text) or "?", author=one_line(clean(text)), at=at, view=view_of(state, None)
-    )
+    words, view = clean(text), view_of(state, None)
+    note = Note(text=words or "?", author=one_line(words), at=at, view=view)
     return replace(state, review=with_note(state.review, note))
 
 

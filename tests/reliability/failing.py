@@ -17,7 +17,7 @@ from warpspace.app.evaluation import live_picture
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.panels.error_list import ErrorsPanel
 from warpspace.app.panels.overlay import HeadPanel, LegendPanel, OrderPanel
-from warpspace.app.panels.top_bar import TopPanel
+from warpspace.app.panels.page_panels import TopPanel
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState
@@ -116,7 +116,9 @@ class Review:
             self.shown("EXX", value)
         for wire in self.wires:
             wire.toasts.clear()
-        if not self.until(lambda _: all(one.display.due_in_s is None for one in self.sessions)):
+        if not self.until(
+            lambda _: all(one.display.scheduler.due_in_s is None for one in self.sessions)
+        ):
             faults.append("the tabs do not come to rest")
         time.sleep(0.05)  # the last part may still be written
         with failing(stage, raised):

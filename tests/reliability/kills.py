@@ -3,7 +3,6 @@
 import os
 import random
 import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -11,9 +10,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from reliability.outcome import Outcome
+from reliability.outcome import Outcome, run_module
 
-HERE = Path(__file__).resolve().parents[1]
 SCENES = ("dvf5000_first", "dvf5000_second")
 LONGEST_S = 0.2
 
@@ -50,17 +48,12 @@ def _writers() -> dict[str, Callable[[int, Path], None]]:
 
 def run(count: int) -> Outcome:
     with tempfile.TemporaryDirectory() as folder:
-        process = subprocess.run(
-            [sys.executable, "-m", "reliability.kills", str(count), folder],
-            cwd=HERE, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        lines = process.stdout.splitlines()
-        if process.returncode:
-            return Outcome(0, "", [process.stderr[-2000:]])
+        last, faults = run_module("kills", str(count), folder)
+        if not last:
+            return Outcome(0, "", faults)
         left = [path.name for path in Path(folder).iterdir() if path.name.startswith(".")]
-        faults = [line[6:] for line in lines if line.startswith("fault ")]
         faults += [f"left behind: {name}" for name in left]
-        done, caught = (int(word) for word in lines[-1].split()[1:])
+        done, caught = (int(word) for word in last.split()[1:])
         return Outcome(
             done,
             f"each file old or new; {caught} were hit with a temporary file beside it, which the"

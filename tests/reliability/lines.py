@@ -23,23 +23,8 @@ FEW, MANY = 12_500, 50_000  # lines
 REPEATS = 3
 PIECES = [
     *(b" ", b"\t", b"1", b"9", b"a", b"A", b"(", b")", b"[", b"{", b"<", b'"', b"'", b"#", b";"),
-    *(
-        b",",
-        b".",
-        b"-",
-        b"=",
-        b":",
-        b"\\",
-        b"/",
-        b"%",
-        b"$",
-        b"_",
-        b"!",
-        b"1 ",
-        b"a ",
-        b"A ",
-        b"1,",
-    ),
+    *(b",", b".", b"-", b"=", b":", b"\\", b"/", b"%", b"$", b"_", b"!", b"1 ", b"a ", b"A "),
+    b"1,",
     *(b"1.", b"a=", b"[ ", b"( ", b"()", b"a(", b"a[", b"X1", b"X1 ", b"// ", b"/*", b"e1", b"0x"),
     *(b"endsolid ", b"solid ", b"vertex ", b"facet ", b"COMP_FILE ", b"coordinates ", b"\xc2\xa0"),
 ]
@@ -66,11 +51,8 @@ def growth(read: Callable[[bytes], object], make: Callable[[int], bytes], *lengt
     """Give the exponent by which time grows with a length; 0 where the longer one is fast."""
     short, long = lengths
     least = math.inf
-    for repeats in (
-        1,
-        REPEATS,
-        REPEATS,
-    ):  # other work on the machine makes it larger, never smaller
+    # other work on the machine makes it larger, never smaller
+    for repeats in (1, REPEATS, REPEATS):
         slow = time_of(read, make(long), repeats)
         if slow < LEAST_S:
             return 0.0

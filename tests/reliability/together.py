@@ -3,7 +3,6 @@
 import os
 import random
 import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -13,9 +12,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from reliability.outcome import Outcome
+from reliability.outcome import Outcome, run_module
 
-HERE = Path(__file__).resolve().parents[1]
 AT_ONCE = 8
 LONGEST_S = 4.0
 MIXED = "is not the matrix of this scene"
@@ -23,15 +21,8 @@ MIXED = "is not the matrix of this scene"
 
 def run(row: str, count: int) -> Outcome:
     with tempfile.TemporaryDirectory() as folder:
-        process = subprocess.run(
-            [sys.executable, "-m", "reliability.together", row, str(count), folder],
-            cwd=HERE, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        lines = process.stdout.splitlines()
-        if process.returncode or not lines:
-            return Outcome(0, "", [process.stderr[-2000:]])
-        faults = [line[6:] for line in lines if line.startswith("fault ")]
-        return Outcome(count, lines[-1], faults)
+        last, faults = run_module("together", row, str(count), folder)
+        return Outcome(count if last else 0, last, faults)
 
 
 def _fork(work: Callable[[], None]) -> int:

@@ -7,16 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from warpspace import load_scene, scene_names
-from warpspace.machine.errors import (
-    Constant,
-    ErrorSet,
-    Harmonics,
-    Poly,
-    Ramp,
-    TableCurve,
-    Tolerance,
-    ToleranceSet,
-)
+from warpspace.machine import errors
 from warpspace.machine.limits import MIN_HALF_WIDTH
 from warpspace.scene.library import parse_scene
 from warpspace.scene.scene_writer import scene_to_toml
@@ -46,17 +37,18 @@ def test_any_numbers_and_any_title_survive(title, value, centre, half, rows, exa
         scene,
         title=title or "untitled",
         description=f'{title}\nsecond line \\ " \'\'\' """',
-        errors=ErrorSet(
+        errors=errors.ErrorSet(
             {
-                "EC0Y": Constant(scene.workspace.ranges["Y"], value),
-                "EAX": Ramp(x, value),
-                "EXX": Poly(x, (value, 1e-7)),
-                "EXC": Harmonics(c, ((1.0, value, 90.0), (2.0, 0.1 + 0.2, 0.0))),
-                "EYX": TableCurve(x, tuple(sorted(rows))),
+                "EC0Y": errors.Constant(scene.workspace.ranges["Y"], value),
+                "EAX": errors.Ramp(x, value),
+                "EXX": errors.Poly(x, (value, 1e-7)),
+                "EXC": errors.Harmonics(c, ((1.0, value, 90.0), (2.0, 0.1 + 0.2, 0.0))),
+                "EYX": errors.TableCurve(x, tuple(sorted(rows))),
             }
         ),
-        tolerances=ToleranceSet(
-            {"rotation": half}, {"EAX": Tolerance(centre, half), "EBX": Tolerance(0.0, half)}
+        tolerances=errors.ToleranceSet(
+            {"rotation": half},
+            {"EAX": errors.Tolerance(centre, half), "EBX": errors.Tolerance(0.0, half)},
         ),
         exaggeration=exaggeration,
         reference={"X": value, "Y": 0.5, "Z": -280.0, "B": 0.0, "C": 0.0},

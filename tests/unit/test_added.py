@@ -4,7 +4,6 @@ import io
 import zipfile
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -17,47 +16,24 @@ from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.live_model import LiveModel
-from warpspace.app.panels.conventions import (
-    ConventionsSection,
-    choices,
-    chosen,
-    effects_of,
-    with_choice,
-)
+from warpspace.app.panels import conventions
 from warpspace.app.panels.error_list import kind_titles, read_curve, spell_rows
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.edits import with_curve
-from warpspace.bench.base import BenchTest, bench_names, register_test, unregister_test
+from warpspace.bench import base
 from warpspace.bench.data import DataColumn
 from warpspace.bench.plan import BenchQuantity, Outcome, build_plan
 from warpspace.cli.services import build_services, write_export
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
+from warpspace.kinematics import model as kinematics
 from warpspace.kinematics.chain import jacobian, nominal_point
-from warpspace.kinematics.model import (
-    Convention,
-    Loop,
-    Model,
-    convention_names,
-    register_convention,
-    unregister_convention,
-)
+from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.curves.curve import ErrorFunction, single_value
 from warpspace.machine.curves.registry import register_curve, unregister_curve
 from warpspace.machine.errors import Constant, Poly, TableCurve
 from warpspace.outputs.drawing.sheet import Drawing, metadata, parameter_words
-from warpspace.outputs.exports.formats import (
-    ExportFormat,
-    export_formats,
-    register_format,
-    unregister_format,
-)
-from warpspace.outputs.figures.registry import (
-    FigureKind,
-    draw_figure,
-    figure_names,
-    register_figure,
-    unregister_figure,
-)
+from warpspace.outputs.exports import formats
+from warpspace.outputs.figures import registry as figures
 from warpspace.outputs.processes import FigureWorker
 from warpspace.outputs.report import ReportSettings, build_report, sections
 from warpspace.picture.model import evaluate_picture
@@ -77,10 +53,9 @@ SPLIT = 'machine = "dvf5000"\n[convention]\ncomponent_errors = "split"\n[errors]
 class HalfSine(ErrorFunction):
     """Zero at both ends of the span, the value in the middle."""
 
-    name: ClassVar[str] = "half_sine"
-    title: ClassVar[str] = "half sine"
-    forms: ClassVar[tuple[tuple[str, ...], ...]] = (("half_sine",),)
-    row_words: ClassVar[str] = "one number: the value in the middle"
+    name, title = "half_sine", "half sine"
+    forms = (("half_sine",),)
+    row_words = "one number: the value in the middle"
     value: float = 0.0
 
     def evaluate(self, position):
@@ -115,13 +90,12 @@ class HalfSine(ErrorFunction):
         return cls(span, present.amplitude)
 
 
-class Split(Convention):
+class Split(kinematics.Convention):
     """``Trans(δ) · Motion · Rot(ε)``: shifts in fixed directions, turns on the moving body."""
 
-    name: ClassVar[str] = "split"
-    title: ClassVar[str] = "shifts before, turns after motion"
-    place: ClassVar[str] = "on both sides of the motion"
-    meaning: ClassVar[str] = "shift in fixed directions and turn with the moving body"
+    name, title = "split", "shifts before, turns after motion"
+    place = "on both sides of the motion"
+    meaning = "shift in fixed directions and turn with the moving body"
 
     def factors(self, constant, motion, component):
         if component is None:
@@ -137,12 +111,10 @@ class Split(Convention):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Corner(BenchTest):
-    name: ClassVar[str] = "corner"
-    title: ClassVar[str] = "Corner"
-    standard: ClassVar[str] = "our own"
-    description: ClassVar[str] = "A dial gauge looks along x."
-    columns: ClassVar[tuple[DataColumn, ...]] = (DataColumn("x_um"),)
+class Corner(base.BenchTest):
+    name, title, standard = "corner", "Corner", "our own"
+    description = "A dial gauge looks along x."
+    columns = (DataColumn("x_um"),)
     repeats: int = option(2, "Readings")
 
     def plan(self, scene):
@@ -158,9 +130,8 @@ class Corner(BenchTest):
         return Outcome((BenchQuantity("x_um", "reading", float(readings.mean()), "µm"),))
 
     def charts(self, runs):
-        curves = tuple(
-            Curve(run.label("x"), np.arange(len(run.readings)) * 1.0, run.readings) for run in runs
-        )
+        number = np.arange(self.repeats) * 1.0
+        curves = tuple(Curve(run.label("x"), number, run.readings) for run in runs)
         return (Lines("lines", "Readings", "number", "x [µm]", curves),)
 
 
@@ -176,20 +147,14 @@ def write_zip(picture, path, *, overwrite=True):
         archive.writestr("mean.txt", f"{picture.statistics.mean_um:.6f}")
 
 
+NAMES = figures.FigureKind("names", "Names of the errors.", draw_names, evidence=True)
+PACKED = formats.ExportFormat(".zip", "the mean, packed", write_zip)
 ADDED = {
     "half_sine": (register_curve, unregister_curve, HalfSine),
-    "split": (register_convention, unregister_convention, Split()),
-    "corner": (register_test, unregister_test, Corner),
-    "names": (
-        register_figure,
-        unregister_figure,
-        FigureKind("names", "Names of the errors.", draw_names, evidence=True),
-    ),
-    ".zip": (
-        register_format,
-        unregister_format,
-        ExportFormat(".zip", "the mean, packed", write_zip),
-    ),
+    "split": (kinematics.register_convention, kinematics.unregister_convention, Split()),
+    "corner": (base.register_test, base.unregister_test, Corner),
+    "names": (figures.register_figure, figures.unregister_figure, NAMES),
+    ".zip": (formats.register_format, formats.unregister_format, PACKED),
 }
 
 
@@ -258,7 +223,7 @@ def test_first_order_of_a_convention_is_the_derivative_of_the_exact_chain(loop):
     gains = {
         name: jacobian(replace(model, component_errors=name), Loop.WORKPIECE, ("EXC", "EAC"),
                        coordinates, np.array([100.0, 50.0, 200.0]))[0].tolist()
-        for name in convention_names()
+        for name in kinematics.convention_names()
     }  # fmt: skip
     assert gains["split"][0] == gains["before_motion"][0] != gains["after_motion"][0]
     assert gains["split"][1] == gains["after_motion"][1] != gains["before_motion"][1]
@@ -282,11 +247,11 @@ def test_the_app_offers_a_curve_reads_converts_and_stores_it():
 def test_the_app_offers_a_convention_says_what_it_changes_and_stores_it():
     fixed = scene_to_toml(FIRST).replace("after_motion", "before_motion")
     start = start_state(parse_scene(fixed, "dvf5000_first"), nodes=3)
-    assert "component_errors=split" in choices(start.scene)
-    state = with_choice(start, "component_errors=split")
-    assert "component_errors=split" in chosen(state.scene)
-    assert effects_of(state)["component_errors=split"][1] > 0.0
-    text = body_of(ConventionsSection, state)
+    assert "component_errors=split" in conventions.choices(start.scene)
+    state = conventions.with_choice(start, "component_errors=split")
+    assert "component_errors=split" in conventions.chosen(state.scene)
+    assert conventions.effects_of(state)["component_errors=split"][1] > 0.0
+    text = body_of(conventions.ConventionsSection, state)
     assert 'value="component_errors=split" checked' in text
     assert "shifts before, turns after motion" in text
     back, _ = open_text(state_to_toml(state), "dvf5000_first", "x.toml")
@@ -294,7 +259,7 @@ def test_the_app_offers_a_convention_says_what_it_changes_and_stores_it():
 
 
 def test_a_test_is_a_command_and_in_the_app(warpspace, tmp_path):
-    assert "corner" in bench_names()
+    assert "corner" in base.bench_names()
     assert "corner" in warpspace("test", "--list").out
     assert "x_um" in warpspace("test", "corner", FIRST.name, "--json").json
     plot = tmp_path / "corner.svg"
@@ -316,8 +281,8 @@ def test_reports_and_figures_have_the_words_of_each(monkeypatch):
     review = SimpleNamespace(scenes=(reviewed,), settings=settings, exaggeration=1000.0)
     said = "Component errors shift in fixed directions and turn with the moving body (on both"
     assert said in str(sections.conventions(review))
-    assert "names" in figure_names()
-    assert "EC0Y" in draw_figure("names", [FIRST]).figure.texts[0].get_text()
+    assert "names" in figures.figure_names()
+    assert "EC0Y" in figures.draw_figure("names", [FIRST]).figure.texts[0].get_text()
     assert ("names", "Names of the errors.") in build_services().figures
     drawn: list[str] = []
 
@@ -332,7 +297,7 @@ def test_reports_and_figures_have_the_words_of_each(monkeypatch):
 
 
 def test_a_format_is_written_by_the_command_and_for_the_app(warpspace, tmp_path):
-    assert ".zip" in [form.ending for form in export_formats()]
+    assert ".zip" in [form.ending for form in formats.export_formats()]
     assert (".zip", "the mean, packed") in build_services().exports
     target = tmp_path / "out.zip"
     result = warpspace("export", FIRST.name, "-o", target, "--grid", "3")

@@ -1,10 +1,13 @@
-"""The package: public names, units, errors."""
+"""The package: public names, declared imports, what a command loads, messages of errors."""
 
+import ast
 import os
 import re
 import runpy
 import subprocess
 import sys
+import tomllib
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
@@ -20,6 +23,7 @@ from warpspace.exceptions import (
     UnknownNameError,
     WarpspaceError,
     near_miss,
+    shorten,
 )
 
 ROOT = Path(__file__).parents[2]
@@ -105,8 +109,54 @@ def test_one_problem_is_one_line_and_several_are_a_list_that_is_cut():
     error = SceneError("a.toml", ["one", "two"])
     assert str(error) == "a.toml: 2 problems\n  - one\n  - two"
     assert error.problems == ("one", "two")
-    problems = [f"problem {number}" for number in range(SHOWN_PROBLEMS + 3)]
+    problems = [f"line {line}: {'9' * 500}" for line in range(SHOWN_PROBLEMS + 3)]
     error = SceneError("a.toml", problems)
-    assert str(error).endswith("\n  … and 3 more")
-    assert str(error).count("\n") == SHOWN_PROBLEMS + 1
+    head, *shown, last = str(error).splitlines()
+    assert (head, last) == (f"a.toml: {len(problems)} problems", "  … and 3 more")
+    nines = f"{'9' * 10}…{'9' * 10}"
+    assert shown == [f"  - line {line}: {nines}" for line in range(SHOWN_PROBLEMS)]
     assert len(error.problems) == len(problems)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (f"P{'9' * 300}; expected less", "P9999999999…9999999999; expected less"),
+        ("1234567890" * 30 + " points", "1234567890…1234567890 points"),
+        (f"{'a' * 5000} is unknown", f"{'a' * 80}…{'a' * 80} is unknown"),
+        (f"/{'folder/' * 25}scene.toml: no such file", None),
+        ("word " * 5000, f"{'word ' * 400}…{'word ' * 16}"),
+        ("line\n" * 1000, None),
+    ],
+)
+def test_endless_numbers_words_and_lines_are_shortened_everywhere(text, expected):
+    expected = text if expected is None else expected
+    assert shorten(text) == expected
+    assert str(OptionError(text)) == OptionError(text).with_names(str) == expected
+
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+EXTRAS = ("cluster", "urdf", "video")
+INDIRECT = {"vtk"}  # pyvista without VTK does not exist; it decides on the version
+
+
+def distribution(name):
+    return re.sub(r"[-_.]+", "-", re.match(r"[\w.-]+", name)[0]).lower()
+
+
+def imported():
+    for path in (ROOT / "src").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Import):
+                yield from (alias.name for alias in node.names)
+            elif isinstance(node, ast.ImportFrom):
+                yield node.module
+
+
+def test_every_import_is_declared():
+    names = {name.partition(".")[0] for name in imported()} - sys.stdlib_module_names
+    distributions = packages_distributions()
+    needed = {distribution(distributions[name][0]) for name in names - {"warpspace"}}
+    lists = [PROJECT["dependencies"], *map(PROJECT["optional-dependencies"].get, EXTRAS)]
+    declared = {distribution(entry) for entries in lists for entry in entries}
+    assert needed - declared - INDIRECT == set()

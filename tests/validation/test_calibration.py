@@ -1,22 +1,22 @@
 """Calibration against the public sphere measurements, and against errors that were planted."""
 
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from bench_scenes import scene_with, vectors
 from warpspace.bench.base import find_test
 from warpspace.bench.plan import simulate
-from warpspace.calibration import Calibrate, calibrate, read_readings
+from warpspace.calibration import Calibrate, calibrate, read_readings, solve
 from warpspace.calibration.calibration_result import Estimability
 from warpspace.calibration.kinds import VIEW, in_other_frame
 from warpspace.calibration.next_best import Candidate, candidates, next_best, u95_at
-from warpspace.calibration.readings import Readings, find_data, parse_reading_table
-from warpspace.calibration.solve import build_fit_parameters, describe_rank, solve
+from warpspace.calibration.readings import find_data, parse_reading_table
+from warpspace.calibration.registry import parse_readings
+from warpspace.calibration.solve import build_fit_parameters, describe_rank
 from warpspace.calibration.spheres import circles_of
 from warpspace.field.evaluate import evaluate_exact
-from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.errors import Constant, ErrorSet, Ramp
 from warpspace.scene.library import load_scene
 
@@ -65,18 +65,13 @@ def test_tcp_on_by_linear_algebra_written_apart():
     readings = read_readings("tcp_on.csv", FORK)
     found = calibrate(FORK, [readings], Calibrate(fit=("EX0B", "EY0B", "EB0B", "EZB")))
     rows = []
-    for b, c in np.deg2rad(
-        np.stack([readings.coordinates["B"], readings.coordinates["C"]], axis=-1)
-    ):
+    for b, c in np.deg2rad(np.stack([readings.coordinates[axis] for axis in "BC"], axis=-1)):
         turn_c = np.array([[np.cos(c), -np.sin(c), 0], [np.sin(c), np.cos(c), 0], [0, 0, 1]])
         turn_b = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
         tip = turn_c @ turn_b @ [-0.66, -26.72, -308.96]
         about_b = np.cross(turn_c[:, 1], tip)
-        rows.append(
-            np.column_stack(
-                [np.eye(3), -turn_c[:, 0], -turn_c[:, 1], -about_b, -(turn_c @ turn_b)[:, 2]]
-            )
-        )
+        columns = -turn_c[:, 0], -turn_c[:, 1], -about_b, -(turn_c @ turn_b)[:, 2]
+        rows.append(np.column_stack([np.eye(3), *columns]))
     system = np.vstack(rows)
     values, *_ = np.linalg.lstsq(system, readings.observed_mm.ravel(), rcond=None)
     left = (readings.observed_mm.ravel() - system @ values).reshape(-1, 3)
@@ -88,15 +83,12 @@ def test_tcp_on_by_linear_algebra_written_apart():
     assert by_key["EB0B"] == pytest.approx(wanted[1], rel=5e-3)
 
 
-def test_poses_left_out_are_predicted(tmp_path):
+def test_poses_left_out_are_predicted():
     lines = find_data("tcp_on.csv").read_text(encoding="utf-8").splitlines()
     rows = [line for line in lines if not line.startswith("#")]
     wide = [row for row in rows[1:] if row.startswith(("30,", "-30,"))]
     near = [row for row in rows[1:] if row not in wide]
-    files = []
-    for name, part in (("near.csv", near), ("wide.csv", wide)):
-        (tmp_path / name).write_text("\n".join([rows[0], *part]), encoding="utf-8")
-        files.append(read_readings(str(tmp_path / name), FORK))
+    files = [parse_readings("\n".join([rows[0], *part]), "a.csv", FORK) for part in (near, wide)]
     assert (len(near), len(wide)) == (15, 8)
     found = calibrate(FORK, files[:1], predict=files[1:])
     assert found.rms_predicted_before_mm == pytest.approx(0.447, abs=0.001)
@@ -115,39 +107,22 @@ def planted(errors, kind, poses, noise=0.0, seed=0):
         linear = FORK.machine.axes[axis].is_linear and key[2] != "0"
         curve = (Ramp if linear else Constant)(FORK.axis_span(axis))
         functions[key] = curve.with_amplitude(value)
-    count = len(next(iter(poses.values())))
-    coordinates = {
-        name: np.asarray(poses.get(name, np.zeros(count)), float) for name in FORK.machine.axes
-    }
-    error = evaluate_exact(FORK.model, ErrorSet(functions), coordinates, VIEW).error_um * 1e-3
+    blank = vectors(FORK, poses, np.zeros((len(next(iter(poses.values()))), 3)))
+    error = evaluate_exact(FORK.model, ErrorSet(functions), blank.coordinates, VIEW).error_um * 1e-3
     error = error + noise * np.random.default_rng(seed).standard_normal(error.shape)
-    tip = relative_point(FORK.model, coordinates)
-    place = np.array([1.0, -2.0, 3.0])
-    observed = error if kind == "points" else tip.mean(axis=0) + place - error
+    if kind == "points":
+        return replace(blank, observed_mm=error)
+    tip = blank.nominal_mm
+    observed = tip.mean(axis=0) + np.array([1.0, -2.0, 3.0]) - error
     if kind == "lengths":
-        station = np.array([900.0, -400.0, 100.0])
-        observed = np.linalg.norm(tip + error - station, axis=-1)[:, None] - 12.5
-    return Readings(
-        kind,
-        coordinates,
-        tip,
-        observed,
-        None,
-        ("a",) * count if kind != "points" else ("",) * count,
-        tuple(range(count)),
-        "planted",
-    )
+        observed = np.linalg.norm(tip + error - [900.0, -400.0, 100.0], axis=-1)[:, None] - 12.5
+    return replace(blank, kind=kind, observed_mm=observed, session=("a",) * len(blank))
 
 
 def sphere_poses():
     b, c = (values.ravel() for values in np.meshgrid([-60, -25, 0, 40, 75], [0, 70, 160, 250]))
-    return {
-        "B": b,
-        "C": c,
-        "X": np.full(20, 350.0),
-        "Y": np.full(20, 300.0),
-        "Z": np.full(20, -700.0),
-    }
+    still = {"X": 350.0, "Y": 300.0, "Z": -700.0}
+    return {"B": b, "C": c, **{axis: np.full(20, at) for axis, at in still.items()}}
 
 
 def volume_poses(count=60):
@@ -219,19 +194,14 @@ def test_told_combinations_hold_in_95_percent_of_trials(trials, near):
     poses = {axis: corner.ravel() for axis, corner in zip("XYZ", corners, strict=True)}
     poses |= {axis: np.full(27, scene.workspace.positions[axis]) for axis in "BC"}
     curves = {key: (Constant if key[2] == "0" else Ramp)(scene.axis_span(key[-1])) for key in keys}
-    tip, held = relative_point(scene.model, poses), []
+    held = []
     for seed in range(trials):
         draw = np.random.default_rng(seed)
-        truth = ErrorSet(
-            {key: one.with_amplitude(draw.normal(0, 10)) for key, one in curves.items()}
-        )
-        read = evaluate_exact(scene.model, truth, poses, VIEW).error_um + draw.standard_normal(
-            (27, 3)
-        )
-        readings = Readings(
-            "points", poses, tip, 1e-3 * read, None, ("",) * 27, tuple(range(27)), ""
-        )
-        found = calibrate(scene, [readings], Calibrate(fit=keys))
+        drawn = {key: one.with_amplitude(draw.normal(0, 10)) for key, one in curves.items()}
+        truth = ErrorSet(drawn)
+        read = evaluate_exact(scene.model, truth, poses, VIEW).error_um
+        read = read + draw.standard_normal((27, 3))
+        found = calibrate(scene, [vectors(scene, poses, read)], Calibrate(fit=keys))
         parts = [one.key for one in found.parameters if one.estimable is Estimability.CONFOUNDED]
         assert parts == [next(iter(one.factors)) for one in found.combinations] != []
         assert all(one.interval_95 is None for one in found.parameters if not one.identifiable)
@@ -290,11 +260,10 @@ def test_poses_at_the_ends_of_the_travel_are_proposed():
     assert "B at -90, -60, -30, 0, 30, 60, 90°" in names[0]
 
 
-def test_lengths_to_stations_are_no_centres_of_a_sphere(tmp_path):
-    path = tmp_path / "lengths.csv"
-    rows = [f"{turn},{turn},0,0,{100 + turn}\n" for turn in range(8)]
-    path.write_text("c_deg,x_mm,y_mm,z_mm,length_mm\n" + "".join(rows), encoding="utf-8")
-    assert read_readings(str(path), load_scene("dvf5000_nominal")).kind == "lengths"
+def test_lengths_to_stations_are_no_centres_of_a_sphere():
+    rows = [f"{turn},{turn},0,0,{100 + turn}" for turn in range(8)]
+    text = "\n".join(["c_deg,x_mm,y_mm,z_mm,length_mm", *rows])
+    assert parse_readings(text, "a.csv", load_scene("dvf5000_nominal")).kind == "lengths"
 
 
 @pytest.mark.parametrize("instrument", ["tracker", "ball bar", "probe", "sphere"])
@@ -330,17 +299,10 @@ def test_a_ball_bar_is_no_thirty_six_error_vectors():
     found = calibrate(scene, [corners], Calibrate(fit=keys))
     bar = next(one for one in candidates(scene) if one.name.startswith("ball bar, circle XY"))
     assert bar.readings.observed_mm.shape == (36, 1)
-    vectors = replace(
-        corners,
-        coordinates=bar.readings.coordinates,
-        nominal_mm=bar.readings.nominal_mm,
-        observed_mm=np.zeros((36, 3)),
-        session=("",) * 36,
-        lines=tuple(range(36)),
-    )
+    points = vectors(scene, bar.readings.coordinates, np.zeros((36, 3)))
     (said,), (full,) = (
         next_best(scene, [corners], found, 1, [Candidate("", one)])
-        for one in (bar.readings, vectors)
+        for one in (bar.readings, points)
     )
     gains = [step.map_before_um - step.map_after_um for step in (said, full)]
     assert 0.0 < gains[0] < 0.2 * gains[1]
@@ -355,17 +317,11 @@ def test_the_map_is_weighted_by_volume():
     assert told == pytest.approx(2.0 * np.sqrt(np.trapezoid(nodes**2, nodes)))
 
 
-def test_squareness_is_found_in_circles_of_two_planes(tmp_path):
+def test_squareness_is_found_in_circles_of_two_planes():
     """Circles in XY and YZ, read as the bench reads them: squareness told, slopes like it said."""
     scene = load_scene("dvf5000_nominal")
-    errors = ErrorSet(
-        {
-            "EC0Y": Constant(scene.axis_span("Y")).with_amplitude(23.1),
-            "EA0Z": Constant(scene.axis_span("Z")).with_amplitude(-17.0),
-        }
-    )
-    machine = replace(scene, errors=errors)
-    files, kinds = [], []
+    machine = scene_with(EC0Y=23.1, EA0Z=-17.0)
+    sets = []
     for plane in ("XY", "YZ"):
         test = find_test("circular")(plane=plane, radius_mm=150.0, points=72)
         plan = test.plan(machine)
@@ -373,11 +329,9 @@ def test_squareness_is_found_in_circles_of_two_planes(tmp_path):
         sign = np.where(plan.marks["sense"] > 0.0, "+", "-")
         rows = zip(sign, plan.marks["angle_deg"], readings, strict=True)
         lines = [f"{way},{angle:.9g},{value:.9g}" for way, angle, value in rows]
-        path = tmp_path / f"{plane}.csv"
-        path.write_text("\n".join(["direction,angle_deg,radial_um", *lines]), encoding="utf-8")
-        files.append(str(path))
-        kinds.append(f"circular:plane={plane}:radius=150")
-    sets = [read_readings(*row) for row in zip(files, [scene] * 2, kinds, strict=True)]
+        text = "\n".join(["direction,angle_deg,radial_um", *lines])
+        kind = f"circular:plane={plane}:radius=150"
+        sets.append(parse_readings(text, f"{plane}.csv", scene, kind))
     found = calibrate(scene, sets, Calibrate(fit=("EC0Y", "EA0Z")))
     values = {one.key: one.value for one in found.parameters}
     assert values == pytest.approx({"EC0Y": 23.1, "EA0Z": -17.0}, rel=1e-5)
@@ -397,18 +351,15 @@ def test_vectors_in_the_wrong_frame_are_recognised_without_a_second_fit(monkeypa
     errors = {"EC0Y": 250.0, "EB0A": -300.0, "EX0C": 120.0}
     curves = {key: Constant((0.0, 1.0), value) for key, value in errors.items()}
     field = evaluate_exact(nominal.model, ErrorSet(curves), poses, replace(VIEW, frame="machine"))
-    observed = 1e-3 * (field.error_um + rng.normal(0.0, 5.0, (count, 3)))
-    readings = Readings(
-        "points", poses, field.nominal_mm, observed, None, ("",) * count, tuple(range(count)),
-        "a.csv", frame="workpiece",
-    )  # fmt: skip
+    read = field.error_um + rng.normal(0.0, 5.0, (count, 3))
+    readings = vectors(nominal, poses, read, frame="workpiece")
     right = in_other_frame(nominal, readings)
     assert right is not None
     request = Calibrate(fit=tuple(errors))
     expected = calibrate(nominal, [right], request)
     fits = []
-    module = sys.modules["warpspace.calibration.calibrate"]
-    monkeypatch.setattr(module, "solve", lambda *a, **k: fits.append(1) or solve(*a, **k))
+    fit = solve.solve
+    monkeypatch.setattr(solve, "solve", lambda *a, **k: fits.append(1) or fit(*a, **k))
     wrong = calibrate(nominal, [readings], request)
     (note,) = (note for note in wrong.notes if "likely wrong" in note)
     assert f"in the machine frame {1e3 * expected.rms_after_mm:.3g} µm" in note

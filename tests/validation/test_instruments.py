@@ -7,17 +7,16 @@ import GTC
 import numpy as np
 import pytest
 
+from bench_scenes import MACHINE, vectors
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, volume_uncertainty
 from warpspace.calibration import Calibrate, calibrate
 from warpspace.calibration.instruments import instrument_names, load_instrument
 from warpspace.calibration.kinds import VIEW
 from warpspace.calibration.next_best import candidates, observability
-from warpspace.calibration.readings import Readings
 from warpspace.calibration.solve import build_fit_parameters
 from warpspace.exceptions import SceneError, UnknownNameError
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.kinematics.model import complete_coordinates
-from warpspace.kinematics.relative_motion import relative_point
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import evaluate
 
@@ -38,17 +37,6 @@ def test_a_budget_is_that_of_gtc(name, length_mm):
     u_um, freedom = instrument.budget(length_mm)
     assert u_um == pytest.approx(GTC.uncertainty(total), rel=1e-9)
     assert freedom == pytest.approx(GTC.dof(total), rel=1e-9)
-
-
-MACHINE = """[machine]
-chain = "wFXYZt"
-[machine.offset_mm]
-t = [0, 0, -300]
-[workspace]
-X = [-100, 300]
-Y = [-100, 100]
-Z = [-200, 0]
-"""
 
 
 def test_a_covariance_at_a_point_is_that_of_gtc():
@@ -107,13 +95,6 @@ def own(tmp_path):
     path = tmp_path / "own.toml"
     path.write_text(BODY, encoding="utf-8")
     return load_instrument(str(path))
-
-
-def vectors(scene, poses, error_um, session=""):
-    count = len(error_um)
-    at = {axis: np.asarray(poses.get(axis, np.zeros(count))) for axis in scene.machine.axes}
-    tip, lines = relative_point(scene.model, at), tuple(range(count))
-    return Readings("points", at, tip, 1e-3 * error_um, None, (session,) * count, lines, "r.csv")
 
 
 @pytest.mark.parametrize("session", ["", "one"])

@@ -5,32 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench_scenes import MACHINE, vectors
 from warpspace.analysis.uncertainty.propagation import scene_uncertainty, volume_uncertainty
 from warpspace.calibration import Calibrate, calibrate
-from warpspace.calibration.readings import Readings
-from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.errors import Constant
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.scene_writer import scene_to_toml
 
-MACHINE = """[machine]
-chain = "wFXYZt"
-[machine.offset_mm]
-t = [0, 0, -300]
-[workspace]
-X = [-100, 300]
-Y = [-100, 100]
-Z = [-200, 0]
-"""
 KEYS = ("EXX:ramp", "EC0Y", "EA0Z", "EB0Z")
 SCENE = parse_scene(MACHINE, "s")
-
-
-def vectors(scene, poses, error_um, session=""):
-    count = len(error_um)
-    at = {axis: np.asarray(poses.get(axis, np.zeros(count))) for axis in scene.machine.axes}
-    tip, lines = relative_point(scene.model, at), tuple(range(count))
-    return Readings("points", at, tip, 1e-3 * error_um, None, (session,) * count, lines, "r.csv")
 
 
 def plane(z, seed=0, session="one"):

@@ -41,36 +41,31 @@ def evaluated(text):
 
 
 def test_every_number_of_the_standard():
-    found = evaluated(csv_text()).outcome
-    # B_i = x̄↑ − x̄↓ = 2, 3, 4, 3, 3
-    assert found["B_um"] == pytest.approx(4.0)
-    assert found["B_mean_um"] == pytest.approx(3.0)
-    # M: x̄_i = −1, −0.5, 1, 0.5, 2.5
-    assert found["M_um"] == pytest.approx(3.5)
-    # E↑ = 4 − 0, E↓ = 1 − (−2), E = 4 − (−2)
-    assert found["E_forward_um"] == pytest.approx(4.0)
-    assert found["E_backward_um"] == pytest.approx(3.0)
-    assert found["E_um"] == pytest.approx(6.0)
-    # R↑ = 4 s at the target with the largest step
-    assert found["R_forward_um"] == pytest.approx(4.0 * 0.6 * S)
-    assert found["R_backward_um"] == pytest.approx(4.0 * 0.8 * S)
-    # R_i = 2s↑ + 2s↓ + |B_i| : 2 + 1.2S, 3 + 1.2S, 4 + 0.8S, 3 + 2S, 3 + 1.6S → 3 + 2S = 6.162
-    assert found["R_um"] == pytest.approx(3.0 + 2.0 * S)
-    # A↑: largest x̄ + 2s = 4 + 1.2S, least x̄ − 2s = −0.4S (target 0; 1 − 0.8S = −0.26)
-    assert found["A_forward_um"] == pytest.approx(4.0 + 1.2 * S + 0.4 * S)
-    # A↓: 1 + 0.4S; −2 − 0.8S at the first target (−1 − 1.6S = −3.53 at the fourth is lower)
-    assert found["A_backward_um"] == pytest.approx(1.0 + 0.4 * S + 1.0 + 1.6 * S)
-    assert found["A_um"] == pytest.approx(4.0 + 1.2 * S + 1.0 + 1.6 * S)
-    row = found.details["targets"][2]
+    found = evaluated(csv_text())
+    assert found.values == pytest.approx({
+        # B_i = x̄↑ − x̄↓ = 2, 3, 4, 3, 3
+        "B_um": 4.0, "B_mean_um": 3.0,
+        # M: x̄_i = −1, −0.5, 1, 0.5, 2.5
+        "M_um": 3.5,
+        # E↑ = 4 − 0, E↓ = 1 − (−2), E = 4 − (−2)
+        "E_forward_um": 4.0, "E_backward_um": 3.0, "E_um": 6.0,
+        # R↑ = 4 s at the target with the largest step
+        "R_forward_um": 4.0 * 0.6 * S, "R_backward_um": 4.0 * 0.8 * S,
+        # R_i = 2s↑ + 2s↓ + |B_i| : 2 + 1.2S, 3 + 1.2S, 4 + 0.8S, 3 + 2S, 3 + 1.6S → 3 + 2S = 6.162
+        "R_um": 3.0 + 2.0 * S,
+        # A↑: largest x̄ + 2s = 4 + 1.2S, least x̄ − 2s = −0.4S (target 0; 1 − 0.8S = −0.26)
+        "A_forward_um": 4.0 + 1.2 * S + 0.4 * S,
+        # A↓: 1 + 0.4S; −2 − 0.8S at the first target (−1 − 1.6S = −3.53 at the fourth is lower)
+        "A_backward_um": 1.0 + 0.4 * S + 1.0 + 1.6 * S, "A_um": 4.0 + 1.2 * S + 1.0 + 1.6 * S,
+    })  # fmt: skip
+    row = found.outcome.details["targets"][2]
     assert row["target_mm"] == 100.0
     assert row["reversal_um"] == pytest.approx(4.0)
     assert row["s_forward_um"] == pytest.approx(0.2 * S)
 
 
 def test_one_direction_gives_the_one_directional_numbers_only():
-    found = evaluated(csv_text("+")).outcome
-    keys = {quantity.key for quantity in found.quantities}
-    assert keys == {"A_forward_um", "E_forward_um", "R_forward_um"}
+    assert {*evaluated(csv_text("+")).values} == {"A_forward_um", "E_forward_um", "R_forward_um"}
 
 
 def test_bands_of_the_figure_are_two_standard_deviations_wide():

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from products import first
 from warpspace import evaluate
 from warpspace.calibration import Calibrate, calibrate, read_readings
 from warpspace.calibration.instruments import load_instrument
-from warpspace.calibration.kinds import Prediction
-from warpspace.calibration.positions import Positions
+from warpspace.calibration.kinds import Positions, Prediction
 from warpspace.calibration.readings import find_data
 from warpspace.calibration.registry import parse_readings
 from warpspace.exceptions import OptionError, SceneError
@@ -28,31 +28,17 @@ FIT = find_data("fit_600.csv").read_text(encoding="utf-8")
 
 def test_chain_is_the_denavit_hartenberg_table():
     """Standard parameters, Rz(θ)·Tz(d)·Tx(a)·Rx(α): those in the README of the data."""
-    table = np.array(
-        [
-            [127.3, 0, 90],
-            [0, -612, 0],
-            [0, -572.3, 0],
-            [163.941, 0, 90],
-            [115.7, 0, -90],
-            [92.2, 0, 0],
-        ]
-    )
+    table = [[127.3, 0, 90], [0, -612, 0], [0, -572.3, 0], [163.941, 0, 90], [115.7, 0, -90],
+             [92.2, 0, 0]]  # fmt: skip
     angles = np.random.default_rng(5).uniform(-180.0, 180.0, (6, 20))
     expected = np.eye(4)
     for (d, a, alpha), theta in zip(table, np.deg2rad(angles), strict=True):
-        c, s, ca, sa = (
-            np.cos(theta),
-            np.sin(theta),
-            *(f(np.deg2rad(alpha)) for f in (np.cos, np.sin)),
+        turn = Rotation.from_euler("z", theta[:, None]) * Rotation.from_euler(
+            "x", np.deg2rad(alpha)
         )
-        o, e = np.zeros_like(theta), np.ones_like(theta)
-        rows = [
-            [c, -s * ca, s * sa, a * c],
-            [s, c * ca, -c * sa, a * s],
-            [o, sa * e, ca * e, d * e],
-        ]
-        step = np.stack([np.stack(row, -1) for row in [*rows, [o, o, o, e]]], -2)
+        step = np.tile(np.eye(4), (20, 1, 1))
+        step[:, :3, :3] = turn.as_matrix()
+        step[:, :3, 3] = np.stack([a * np.cos(theta), a * np.sin(theta), np.full(20, d)], -1)
         expected = expected @ step
     found = branch_pose(UR10.model, "tool", dict(zip(JOINTS, angles, strict=True)))
     np.testing.assert_allclose(found, expected, atol=1e-9)

@@ -1,4 +1,4 @@
-"""Mean volumetric errors of sampled machines, and the analytical check of E|E|²."""
+"""Volumetric errors of measured and of sampled machines, and the analytical check of E|E|²."""
 
 import math
 
@@ -8,12 +8,13 @@ import pytest
 import warpspace
 from products import pairwise
 from warpspace.analysis.commands.contributions import expected_square
-from warpspace.analysis.commands.montecarlo import case_of
 from warpspace.analysis.loop_parameters import loop_keys
-from warpspace.analysis.sampling.cases import Case, SamplingPlan
+from warpspace.analysis.sampling.cases import Case, Reduction, SamplingPlan, reduce_nodes
 from warpspace.analysis.sampling.distribution import build_draws
 from warpspace.analysis.sampling.machine_sampling import montecarlo
+from warpspace.analysis.statistics import statistics
 from warpspace.kinematics.model import Loop
+from warpspace.scene.model import second_order
 
 MEANS = [
     ("dvf5000_general", "tool", "uniform", 41.1, 0.5),
@@ -50,7 +51,7 @@ def test_sampled_mean_square_is_the_trace(name, loop, distribution):
         samples=100_000,
         seed=5,
     )
-    variance, offset = expected_square(case_of(scene, result))
+    variance, offset = expected_square(result.case)
     assert result.rms_um == pytest.approx(math.sqrt(variance.sum() + offset), rel=0.005)
 
 
@@ -74,12 +75,33 @@ def test_max_over_the_corners_is_the_max_over_the_grid():
     scene = warpspace.load_scene("dvf5000_general")
     keys = loop_keys(scene.model, Loop.TOOL, scene.parameter_keys)
     draws = build_draws(scene.tolerances, keys, "uniform")
-    from warpspace.analysis.sampling.cases import Case, Reduction, reduce_nodes
-
     case = Case(scene.model, draws, scene.workspace)
     machines = draws.draw(np.random.default_rng(0), 500)
     found = [
         reduce_nodes(machines, case.responses(find(7)), Reduction.MAX)
-        for find in (case.site.extreme, case.site.spread)
+        for find in (case.extreme, case.spread)
     ]
     np.testing.assert_allclose(found[0], found[1], rtol=1e-12)
+
+
+MEASURED = ("dvf5000_first", "dvf5000_second")
+
+
+@pytest.mark.parametrize(("name", "mean_um"), [("dvf5000_first", 31.66), ("dvf5000_second", 14.58)])
+@pytest.mark.parametrize("exact", [False, True])
+def test_table_5_5_mean_error_over_11_cubed_nodes(name, mean_um, exact):
+    field = warpspace.evaluate(warpspace.load_scene(name), grid=11, exact=exact)
+    assert field.error_um.shape == (11, 11, 11, 3)
+    assert statistics(field).mean_um == pytest.approx(mean_um, abs=0.02)
+
+
+@pytest.mark.parametrize("name", MEASURED)
+@pytest.mark.parametrize("loop", ["tool", "workpiece", "relative"])
+def test_exact_minus_first_order_is_at_most_a_hundredth_of_a_micrometre(name, loop):
+    scene = warpspace.load_scene(name)
+    exact = warpspace.evaluate(scene, grid=21, loop=loop, exact=True)
+    first = warpspace.evaluate(scene, grid=21, loop=loop)
+    difference = np.linalg.norm(exact.error_um - first.error_um, axis=-1).max()
+    assert difference <= 0.01
+    if loop != "workpiece":
+        assert 0.0 < second_order(scene, loop).um <= difference

@@ -1,6 +1,7 @@
 """Reading a figure back: from pixels to numbers, with a ruler and the colour bar."""
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from trimesh import Trimesh
@@ -42,9 +43,8 @@ class Reading:
 
 def invert_colours(rgb: Array, scale: ColourScale, diverging: bool | None = None) -> Array:
     """Find the values of colours, by the nearest point on the polyline of the colour map."""
-    table = colour_table(diverging=scale.diverging if diverging is None else diverging).astype(
-        float
-    )
+    diverging = scale.diverging if diverging is None else diverging
+    table = colour_table(diverging=diverging).astype(float)
     start, step = table[:-1], np.diff(table, axis=0)
     length = np.maximum((step**2).sum(axis=-1), 1e-9)
     along = np.clip(((rgb[:, None] - start) * step).sum(axis=-1) / length, 0.0, 1.0)
@@ -94,12 +94,8 @@ def read_map(
 def _inside(raster: Raster, spots: Array, px_per_mm: float) -> np.ndarray:
     """Keep points whose surroundings are one smooth piece of surface."""
     reach = EDGE_PX / raster.sampling
-    around = [
-        raster.depth_at(spots + np.array([dx, dy]))
-        for dx in (-reach, 0.0, reach)
-        for dy in (-reach, 0.0, reach)
-    ]
-    stacked = np.stack(around)
+    around = product((-reach, 0.0, reach), repeat=2)
+    stacked = np.stack([raster.depth_at(spots + np.array(step)) for step in around])
     drawn = np.isfinite(stacked).all(axis=0)
     steep = np.ptp(np.where(drawn, stacked, 0.0), axis=0)
     return drawn & (steep < 4.0 * 2.0 * reach / px_per_mm)

@@ -106,7 +106,6 @@ class Series:
     """Bars of one kind, one a row; None where a row has none."""
 
     values: Sequence[float | None]
-    word: str = ""  # in the legend
     role: Role = "plain"  # its colour; "key" stands out, "set" is of another kind
     spread: Sequence[float] = ()  # half lengths of intervals
     as_mark: bool = False  # a stroke instead of a bar

@@ -130,6 +130,7 @@ class Analysis(ABC):
     has_chart: ClassVar[bool] = False  # whether its results hold a chart, so that there is a --plot
     chart_help: ClassVar[str] = "chart"  # what that --plot draws
     has_table: ClassVar[bool] = False  # whether its results hold a table for --csv
+    run_options: ClassVar[tuple[str, ...]] = ()  # keywords of its `run_all`, for Python only
 
     def __post_init__(self) -> None:
         """Convert strings and mappings to the types of the fields; check the ranges."""

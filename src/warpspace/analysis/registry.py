@@ -1,14 +1,15 @@
-"""Registry of the analyses: one line here, one file each; plug-ins register theirs.
+"""Registries of analyses, one line here, one file each, and of publications; plug-ins add theirs.
 
 Analyses are imported when they are used, so that the list costs no start-up time.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 from warpspace.exceptions import UnknownNameError
-from warpspace.plugins import load_plugins
+from warpspace.plugins import Registry
 
 if TYPE_CHECKING:
     from warpspace.analysis.description import Analysis, ProgressCallback, Result, Task
@@ -25,17 +26,16 @@ TASKS: "dict[Task, str]" = {
 """Headings of the command list, by task."""
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
+class Entry(NamedTuple):
     """Entry of the list: name, task and summary of an analysis, and its place."""
 
     name: str
     task: "Task"
     sentence: str
-    place: str = ""  # module:Class
+    place: "str | type[Analysis]" = ""  # module:Class, or the class of a plug-in
 
     def load(self) -> "type[Analysis]":
-        return resolve_name(self.place) if self.place else _ADDED[self.name]
+        return resolve_name(self.place) if isinstance(self.place, str) else self.place
 
 
 R_co = TypeVar("R_co", bound="Result", covariant=True)
@@ -49,7 +49,6 @@ class Verb(Protocol[R_co]):
         ...
 
 
-_ADDED: "dict[str, type[Analysis]]" = {}
 _BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
     ("gains", "understand", "analysis.commands.gains:Gains",
      "Rank the error parameters of SCENE by their gain."),
@@ -86,39 +85,29 @@ _BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
     ("contributions", "design", "analysis.commands.contributions:Contributions",
      "Show which tolerances the volumetric error comes from."),
 )  # fmt: skip
-_ENTRIES = {
-    name: Entry(name, task, sentence, f"warpspace.{place}")
-    for name, task, place, sentence in _BUNDLED
-}
+_ENTRIES: Registry[Entry] = Registry(
+    "analysis",
+    {
+        name: Entry(name, task, sentence, f"warpspace.{place}")
+        for name, task, place, sentence in _BUNDLED
+    },
+)
+unregister = _ENTRIES.unregister
+entries = _ENTRIES.members
+"""List all analyses without importing any."""
 
 
 def register(kind: "type[Analysis]") -> None:
     """Register an analysis; it becomes a command, a panel and a section of the report."""
-    if kind.name in _ENTRIES:
-        raise ValueError(f"an analysis {kind.name!r} is already registered")
-    _ADDED[kind.name] = kind
-    _ENTRIES[kind.name] = Entry(kind.name, kind.task, first_line(kind))
-
-
-def unregister(name: str) -> None:
-    del _ADDED[name], _ENTRIES[name]
+    _ENTRIES.register(Entry(kind.name, kind.task, first_line(kind), kind))
 
 
 def first_line(kind: "type[Analysis]") -> str:
     return (kind.__doc__ or "").partition("\n")[0]
 
 
-def entries() -> tuple[Entry, ...]:
-    """List all analyses without importing any."""
-    load_plugins()
-    return tuple(_ENTRIES.values())
-
-
 def find_analysis(name: str) -> "type[Analysis]":
-    load_plugins()
-    if name not in _ENTRIES:
-        raise UnknownNameError("analysis", name, _ENTRIES)
-    return _ENTRIES[name].load()
+    return _ENTRIES.find(name).load()
 
 
 def verb(name: str) -> "Verb[Result]":
@@ -127,18 +116,37 @@ def verb(name: str) -> "Verb[Result]":
 
     kind = find_analysis(name)
     names = [option.name for option in options_of(kind)]
-    run_names = [*(kind.run_all.__kwdefaults__ or {})]
 
     def run(
         *scenes: "Scene", watch: "ProgressCallback" = ignore_progress, **options: Any
     ) -> "Result":
         for key in options:
-            if key not in names and key not in run_names:
-                raise UnknownNameError(f"option of {name}", key, [*names, *run_names])
-        analysis = kind(**{key: options[key] for key in options if key in names})
-        arguments = {key: options[key] for key in options if key in run_names}
-        return analysis.run_all(scenes, watch, **arguments)
+            if key not in (*names, *kind.run_options):
+                raise UnknownNameError(f"option of {name}", key, [*names, *kind.run_options])
+        arguments = {key: options.pop(key) for key in kind.run_options if key in options}
+        return kind(**options).run_all(scenes, watch, **arguments)
 
     run.__name__ = run.__qualname__ = name
     run.__doc__ = kind.__doc__
     return run
+
+
+class PrintedNumber(NamedTuple):
+    """A number of a publication, and the phrase that quotes it."""
+
+    value_um: float
+    quotation: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Publication:
+    """Numbers that a publication gives; each function returns nothing for other machines."""
+
+    name: str  # heading of a column, mark of a chart, start of a key of a CSV file
+    key_errors: Callable[[str], tuple[str, ...]]  # key errors of a machine by its name
+    # mean |E| of machines within the tolerances of a scene, at one random point each, of a loop
+    sampled_mean: "Callable[[Scene, str], PrintedNumber | None]"
+    measured_error: "Callable[[Scene], PrintedNumber | None]"  # volumetric error of a machine
+
+
+PUBLICATIONS: Registry[Publication] = Registry("publication", {})

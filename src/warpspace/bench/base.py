@@ -15,8 +15,7 @@ from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.options import File, Option, Place, option, options_of
 from warpspace.analysis.sampling.distribution import round_width
 from warpspace.analysis.uncertainty.propagation import plus_minus, scene_uncertainty
-from warpspace.bench.data import DataColumn, read_table, unit_notes
-from warpspace.bench.data import ReadingsFile as DataTable
+from warpspace.bench.data import DataColumn, ReadingsFile, read_table, unit_notes
 from warpspace.bench.plan import BenchPlan, Outcome, fit_setup, respond, simulate
 from warpspace.kinematics.model import Loop, Model, complete_coordinates
 from warpspace.plugins import Registry, load_plugins
@@ -112,7 +111,7 @@ class BenchTest(Analysis):
         """
 
     @abstractmethod
-    def plan_data(self, scene: Scene, table: DataTable) -> tuple[BenchPlan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         """Build the path of measured readings and return the readings in its order, [m].
 
         Raises
@@ -133,7 +132,7 @@ class BenchTest(Analysis):
         """Return the columns of a file of readings."""
         return self.columns
 
-    def data_notes(self, table: DataTable) -> tuple[str, ...]:  # noqa: ARG002 - for subclasses
+    def data_notes(self, table: ReadingsFile) -> tuple[str, ...]:  # noqa: ARG002 - for subclasses
         """List the differences between a file of readings and the options of the test."""
         return ()
 
@@ -184,25 +183,17 @@ class BenchResult(Result):
     @cached_property
     def u95(self) -> dict[str, float | None]:
         """U95 of the quantities of the model by key; empty if the scene states no uncertainty."""
-        run, scene, uncertainty = (
-            self.model,
-            self.scene,
-            scene_uncertainty(self.scene, Loop.RELATIVE),
-        )
+        run, uncertainty = self.model, scene_uncertainty(self.scene, Loop.RELATIVE)
         if uncertainty is None:
             return {}
-        responses = (
-            respond(replace(scene, errors=errors), run.plan, keys)
-            for errors, keys in uncertainty.layers
-        )
-        gains = np.hstack([*responses])
+        layers = [(replace(self.scene, errors=part), keys) for part, keys in uncertainty.layers]
+        gains = np.hstack([respond(scene, run.plan, keys) for scene, keys in layers])
 
         def evaluate_change(change: Array) -> Array:
             outcome = self.test.evaluate(run.plan, run.readings + gains @ change)
-            return np.array([one.value for one in outcome.quantities])
+            return np.array([quantity.value for quantity in outcome.quantities])
 
-        keys = (one.key for one in run.outcome.quantities)
-        return dict(zip(keys, uncertainty.propagate(evaluate_change), strict=True))
+        return dict(zip(run.values, uncertainty.propagate(evaluate_change), strict=True))
 
     @property
     def charts(self) -> tuple[Lines, ...]:
@@ -233,12 +224,11 @@ class BenchResult(Result):
         yield f"{self.test.title} ({self.test.standard}) · {self.scene.title}"
         yield f"  {self.model.plan.place} · {self.model.plan.readings} readings"
         rows: dict[str, list[Any]] = {}
-        for index, run in enumerate(self.runs):
+        for index, run in enumerate(self.runs, start=1):
             for quantity in run.outcome.quantities:
-                row = rows.setdefault(
-                    quantity.key, [quantity.name, *[None] * len(self.runs), quantity.unit]
-                )
-                row[1 + index] = 0.0 if abs(quantity.value) < PRINTED else quantity.value
+                empty = [quantity.name, *[None] * len(self.runs), quantity.unit]
+                value = 0.0 if abs(quantity.value) < PRINTED else quantity.value
+                rows.setdefault(quantity.key, empty)[index] = value
         numbers = (Column(run.source, ".3f") for run in self.runs)
         columns = (Column("", leads=True, wraps=True), *numbers, Column("unit"))
         if self.u95:
@@ -249,7 +239,11 @@ class BenchResult(Result):
 
 
 def run_test(
-    scene: Scene, test: BenchTest, data: str | Path | DataTable | None = None, *, exact: bool = True
+    scene: Scene,
+    test: BenchTest,
+    data: str | Path | ReadingsFile | None = None,
+    *,
+    exact: bool = True,
 ) -> BenchResult:
     """Run a test on the model of a scene and evaluate measured readings by the same formulas.
 
@@ -283,24 +277,24 @@ def run_test(
     >>> round(result.model.outcome["z_um"], 1)
     21.5
     """
-    table = (
-        data
-        if data is None or isinstance(data, DataTable)
-        else read_table(data, test.data_columns(scene))
-    )
-    plan, measured = (test.plan(scene), None) if table is None else test.plan_data(scene, table)
+    if data is None:
+        plan = test.plan(scene)
+        return BenchResult(
+            test, scene, (_run("model", test, plan, simulate(scene, plan, exact=exact)),)
+        )
+    table = data
+    if not isinstance(table, ReadingsFile):
+        table = read_table(table, test.data_columns(scene))
+    plan, measured = test.plan_data(scene, table)
     readings = simulate(scene, plan, exact=exact)
-    runs = (BenchRun("model", plan, readings, test.evaluate(plan, readings)),)
-    if table is None or measured is None:
-        return BenchResult(test, scene, runs)
     angular = any(name.endswith("_urad") for name in table.columns)
     notes = unit_notes(measured, readings, "µrad" if angular else "µm")
-    return BenchResult(
-        test,
-        scene,
-        (*runs, BenchRun("measured", plan, measured, test.evaluate(plan, measured))),
-        (*table.notes, *test.data_notes(table), *notes),
-    )
+    runs = _run("model", test, plan, readings), _run("measured", test, plan, measured)
+    return BenchResult(test, scene, runs, (*table.notes, *test.data_notes(table), *notes))
+
+
+def _run(source: str, test: BenchTest, plan: BenchPlan, readings: Array) -> BenchRun:
+    return BenchRun(source, plan, readings, test.evaluate(plan, readings))
 
 
 BASE = 0.62  # radius of the circle of no deviation; the plot reaches to 1
@@ -326,9 +320,8 @@ def lay_polar(chart: Lines) -> PolarLayout:
     per_unit = RING_WIDTH / (RINGS * ring)
     curves: list[Array] = []
     for curve in chart.curves:
-        theta = np.deg2rad(curve.x)
-        radius = BASE + per_unit * curve.y
-        curves.append(np.stack([radius * np.cos(theta), radius * np.sin(theta)], axis=-1))
+        x, y = np.cos(np.deg2rad(curve.x)), np.sin(np.deg2rad(curve.x))
+        curves.append((BASE + per_unit * curve.y)[:, None] * np.stack([x, y], axis=-1))
     unit = "µrad" if "µrad" in chart.y_label else "µm"
     rings = tuple((step * ring, BASE + per_unit * step * ring) for step in range(-RINGS, RINGS + 1))
     return PolarLayout(ring, unit, rings, tuple(curves))

@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.bench.plan import BenchPlan, build_plan
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
@@ -42,29 +42,17 @@ class AxisLine:
     sign: float
 
 
-def linear_axis(machine: Machine, name: str) -> str:
-    """Return the name of a linear axis; the first one for an empty name."""
-    candidates = [axis.name for axis in machine.axes.values() if axis.is_linear]
-    return _named(machine, name, candidates, "linear")
-
-
-def rotary_axis(machine: Machine, name: str) -> str:
-    """Return the name of a rotary axis; the last of the list (C before B) for an empty name."""
-    candidates = [axis.name for axis in machine.axes.values() if not axis.is_linear]
-    return _named(machine, name, candidates[::-1], "rotary")
-
-
-def _named(machine: Machine, name: str, candidates: list[str], kind: str) -> str:
-    if not candidates:
+def find_axis(machine: Machine, name: str, kind: Literal["linear", "rotary"]) -> str:
+    """Return the name of an axis; for an empty name the first linear or the last rotary one."""
+    axes = [axis.name for axis in machine.axes.values() if axis.is_linear == (kind == "linear")]
+    if not axes:
         raise OptionError(f"the machine {machine.chain} has no {kind} axis")
     if not name:
-        return candidates[0]
+        return axes[0 if kind == "linear" else -1]
     if name not in machine.axes:
         raise UnknownNameError("axis", name, machine.axes)
-    if name not in candidates:
-        raise OptionError(
-            f"axis {name} is not {kind}; expected one of {', '.join(sorted(candidates))}"
-        )
+    if name not in axes:
+        raise OptionError(f"axis {name} is not {kind}; expected one of {', '.join(sorted(axes))}")
     return name
 
 
@@ -92,12 +80,18 @@ def axis_line(model: Model, coordinates: Coordinates, axis: str) -> AxisLine:
     return AxisLine(before[..., :3, 3], along, across, upright, sign)
 
 
-def following_axes(model: Model) -> tuple[str, str, str]:
-    """Return the three linear axes that hold the tool on a point: the first per direction."""
+def linear_axes(machine: Machine) -> dict[int, str]:
+    """Return the first linear axis along each direction, in the order of the machine."""
     axes: dict[int, str] = {}
-    for axis in model.machine.axes.values():
+    for axis in machine.axes.values():
         if axis.is_linear:
             axes.setdefault(direction_index(axis.name), axis.name)
+    return axes
+
+
+def following_axes(model: Model) -> tuple[str, str, str]:
+    """Return the three linear axes that hold the tool on a point."""
+    axes = linear_axes(model.machine)
     if len(axes) != 3:
         raise OptionError(
             f"the machine {model.machine.chain} lacks three linear axes; expected one along each"
@@ -111,20 +105,15 @@ def follow(model: Model, coordinates: Mapping[str, Array], target_mm: Array) -> 
     names, shape = following_axes(model), batch_shape(coordinates)
     start = {name: np.broadcast_to(values, shape) for name, values in coordinates.items()}
 
-    def gap(at: Coordinates) -> Array:
-        target = transforms.apply(branch_pose(model, "workpiece", at), target_mm)
-        return nominal_point(model, Loop.TOOL, at) - target
-
+    target = transforms.apply(branch_pose(model, "workpiece", start), target_mm)
+    gap = nominal_point(model, Loop.TOOL, start) - target
     moves = np.stack([motion_direction(model, start, name) for name in names], axis=-1)
     if np.abs(np.linalg.det(moves)).min() < FLAT:
         raise OptionError(
             f"{', '.join(names)} move in one plane in some pose and cannot follow the point"
         )
-    inverse_moves: Array = np.asarray(np.linalg.inv(moves), dtype=np.float64)
-    steps = -transforms.rotate(inverse_moves, gap(start))
-    for index, name in enumerate(names):
-        start[name] = start[name] + steps[..., index]
-    return start
+    steps = -transforms.rotate(np.asarray(np.linalg.inv(moves), dtype=np.float64), gap)
+    return start | {name: start[name] + steps[..., at] for at, name in enumerate(names)}
 
 
 def within_travel(machine: Machine, coordinates: Mapping[str, Array]) -> NDArray[np.bool_]:
@@ -158,8 +147,6 @@ PLANES = ("XY", "XZ", "YZ")
 class AxisPlane:
     """A plane of two axes in one pose of a machine."""
 
-    first: str  # axes
-    second: str
     key: str  # the constant that changes the angle between them
     first_direction: Array  # [3]; unit vectors in R: programmed positive directions
     second_direction: Array
@@ -181,10 +168,9 @@ def find_plane(model: Model, stand: Coordinates, plane: str) -> AxisPlane:
     first, second = plane_axes(model.machine, plane)
     along, up = (programmed_direction(model, stand, axis) for axis in (first, second))
     key, change = angle_error(model.machine, first, second)
-    return AxisPlane(first, second, key, along, up, -change)
+    return AxisPlane(key, along, up, -change)
 
 
-BAR_MM = 100.0  # length of a bar at a rotary axis: motion across it is of second order
 SHARE = 0.3  # default radius as a share of the shortest edge of the working volume
 
 
@@ -205,113 +191,10 @@ def default_ball(
         if scene.machine.axes[name].is_linear and low < high
     ]
     radius = radius_mm if radius_mm is not None else SHARE * min(edges, default=100.0)
-    turn = scene.machine.axes[axis].direction * float(stand[axis])
-    theta = np.deg2rad(turn)
+    theta = np.deg2rad(scene.machine.axes[axis].direction * float(stand[axis]))
     ball = line.origin_mm + height * line.direction
     ball = ball + radius * (np.cos(theta) * line.across + np.sin(theta) * line.upright)
     return transforms.apply(transforms.inverse(pose), ball)
-
-
-def follow_ball(
-    scene: Scene, model: Model, axis: str, angle_deg: Array, ball_mm: Array, stand: Coordinates
-) -> dict[str, Array]:
-    coordinates = follow(model, {**stand, axis: angle_deg}, ball_mm)
-    check_travel(scene, coordinates, f"the path about {axis}")
-    return coordinates
-
-
-def reachable_positions(
-    scene: Scene,
-    model: Model,
-    axis: str,
-    ball_mm: Array,
-    stand: Mapping[str, Array],
-    start: float | None,
-    end: float | None,
-    points: int,
-) -> Array:
-    """Choose positions of a rotary axis that the linear axes can follow, [points], degrees."""
-    low, high = scene.machine.axes[axis].travel
-    present = float(np.clip(stand[axis], low, high))
-    if high - low > 360.0:
-        low = max(low, min(present - 180.0, high - 360.0))
-        high = low + 360.0
-    if start is not None or end is not None:
-        first, last = low if start is None else start, high if end is None else end
-        if not first < last:
-            raise OptionError(f"{axis} from {first:g} to {last:g}°; expected start below end")
-        return np.linspace(first, last, points)
-    fine = np.unique(np.append(np.linspace(low, high, 721), present))
-    inside = within_travel(scene.machine, follow(model, {**stand, axis: fine}, ball_mm))
-    present_index = int(np.searchsorted(fine, present))
-    if not inside[present_index]:
-        ball_text = ", ".join(f"{value:.4g}" for value in ball_mm)
-        raise OptionError(
-            f"the tool cannot reach the ball at ({ball_text}) mm of the workpiece with"
-            f" {axis} = {present:g}; give {{ball}} x,y,z within the travel"
-        )
-    outside = np.flatnonzero(~inside)
-    before, after = outside[outside < present_index], outside[outside > present_index]
-    first = float(fine[before[-1] + 1] if len(before) else fine[0])
-    last = float(fine[after[0] - 1] if len(after) else fine[-1])
-    if last - first < 1.0:
-        raise OptionError(
-            f"{axis} could turn by {last - first:.2g}° only before a linear axis reaches its end;"
-            " give {ball} x,y,z nearer to the axis"
-        )
-    return np.linspace(first, last, points)
-
-
-def circle_directions(
-    model: Model, axis: str, coordinates: Coordinates, point_mm: Array
-) -> dict[str, Array]:
-    line = axis_line(model, coordinates, axis)
-    axial = np.broadcast_to(line.direction, point_mm.shape)
-    arm = point_mm - line.origin_mm
-    arm = arm - np.sum(arm * axial, axis=-1, keepdims=True) * axial
-    length = np.linalg.norm(arm, axis=-1, keepdims=True)
-    if length.min() < 1e-3:
-        raise OptionError(f"the ball lies on {axis}; expected a distance from it")
-    radial = arm / length
-    tangential: Array = np.asarray(np.cross(axial, radial), dtype=np.float64)
-    return {"radial": radial, "tangential": tangential, "axial": axial}
-
-
-def plan_followed_circle(
-    scene: Scene,
-    model: Model,
-    name: str,
-    radius_mm: float,
-    bar: str,
-    stand: Mapping[str, Array],
-    angle_deg: Array,
-    sense: Array,
-) -> BenchPlan:
-    axis = rotary_axis(scene.machine, name)
-    ball = default_ball(scene, model, axis, stand, radius_mm)
-    coordinates = follow_ball(scene, model, axis, angle_deg, ball, stand)
-    count = len(angle_deg)
-    point = tool_points(model, coordinates, count)
-    direction = circle_directions(model, axis, coordinates, point)[bar]
-    theta = np.deg2rad(angle_deg)
-    return build_plan(
-        coordinates,
-        point,
-        direction,
-        place=f"{axis} turns · ball {radius_mm:g} mm from it · {bar} bar",
-        marks={
-            "angle_deg": angle_deg,
-            "sense": sense,
-            "along": np.cos(theta),
-            "up": np.sin(theta),
-            "as_read": np.ones(count),
-        },
-        length_mm=BAR_MM,
-        travel=travel_directions(coordinates, sense),
-        setup={
-            **ball_setup(model, coordinates, direction), "bar_um": np.ones(count),
-        },
-    )  # fmt: skip
 
 
 def ball_setup(
@@ -334,11 +217,10 @@ def travel_directions(coordinates: Mapping[str, Array], sense: Array) -> dict[st
     directions: dict[str, Array] = {}
     starts = np.flatnonzero(np.diff(sense, prepend=np.nan) != 0.0)
     for name, values in coordinates.items():
-        step = np.diff(values, prepend=np.nan)
-        step[starts] = np.nan
-        for start in starts:  # the first point of a stretch is reached as the second one is
-            step[start] = step[start + 1] if start + 1 < len(step) else 0.0
-        step = np.where(np.abs(np.nan_to_num(step)) < 1e-9, 0.0, np.nan_to_num(step))
+        step = np.diff(values, prepend=0.0, append=values[-1:])
+        # the first point of a stretch is reached as the second one is
+        step[starts] = np.where(np.isin(starts + 1, starts), 0.0, step[starts + 1])
+        step = np.where(np.abs(step[:-1]) < 1e-9, 0.0, step[:-1])
         if step.any():
             directions[name] = np.sign(step)
     return directions

@@ -1,6 +1,6 @@
 """Plan and outcome of a test: poses, sensed directions, readings on the model."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ from warpspace.field.evaluate import View, build_basis, evaluate_exact
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.axes import TravelDirection, parameter
 from warpspace.machine.curves.simple import Directional
-from warpspace.machine.errors import ErrorFunction, ErrorSet
+from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
@@ -126,6 +126,20 @@ class Outcome:
         return next(quantity.value for quantity in self.quantities if quantity.key == key)
 
 
+UNITS = {"um": "µm", "urad": "µrad", "m": "µm/m"}
+
+
+def build_outcome(
+    rows: Iterable[tuple[str, str, float]], details: Mapping[str, object] | None = None
+) -> Outcome:
+    """Build an outcome of quantities: key, which ends in its unit, name and value."""
+    quantities = (
+        BenchQuantity(key, name, float(value), UNITS[key.rpartition("_")[2]])
+        for key, name, value in rows
+    )
+    return Outcome(tuple(quantities), details or {})
+
+
 RELATIVE = View(Loop.RELATIVE)
 
 
@@ -136,8 +150,7 @@ def simulate(scene: Scene, plan: BenchPlan, *, exact: bool = True) -> Array:
         return respond(scene, plan, scene.parameter_keys) @ np.array(amplitudes, dtype=float)
     error_um = np.zeros((len(plan.point_mm), 3))
     model = _mean_of_directions(scene)
-    for rows, errors in _by_travel(scene.errors, plan):
-        coordinates = {name: values[rows] for name, values in plan.coordinates.items()}
+    for rows, coordinates, errors in _by_travel(scene.errors, plan):
         field = evaluate_exact(model, errors, coordinates, RELATIVE, plan.point_mm[rows])
         error_um[rows] = field.error_um
     return sense(plan, error_um)
@@ -170,10 +183,11 @@ def respond_sites(scene: Scene, plan: BenchPlan, keys: Sequence[str]) -> Array:
     """Compute the errors of all sites per unit of each parameter, [K, n, 3], µm."""
     position = np.zeros((len(keys), len(plan.point_mm), 3))
     model = _mean_of_directions(scene)
-    for rows, errors in _by_travel(scene.errors, plan):
-        coordinates = {name: values[rows] for name, values in plan.coordinates.items()}
+    whole = np.array([scene.errors.amplitude(key) for key in keys], dtype=float)
+    for rows, coordinates, errors in _by_travel(scene.errors, plan):
         basis = build_basis(model, errors, keys, coordinates, RELATIVE, plan.point_mm[rows])
-        share = np.array([_share(scene.errors, errors, key) for key in keys])
+        active = np.array([errors.amplitude(key) for key in keys], dtype=float)
+        share = np.divide(active, whole, out=np.ones(len(keys)), where=whole != 0.0)
         position[:, rows] = basis.position * share[:, None, None]
     return position
 
@@ -194,42 +208,29 @@ def _differences(plan: BenchPlan, values: Array) -> Array:
     return shift
 
 
-def _by_travel(errors: ErrorSet, plan: BenchPlan) -> Iterator[tuple[IndexArray, ErrorSet]]:
-    sites = np.arange(len(plan.point_mm))
-    functions = errors.functions.items()
+def _by_travel(
+    errors: ErrorSet, plan: BenchPlan
+) -> Iterator[tuple[IndexArray, dict[str, Array], ErrorSet]]:
+    """Split a path by direction of travel: sites, their axis positions, and the errors there."""
     directional = {
-        parameter(key).axis for key, function in functions if isinstance(function, Directional)
+        key: function
+        for key, function in errors.functions.items()
+        if isinstance(function, Directional)
     }
-    axes = [axis for axis in plan.travel if axis in directional]
-    if not axes:
-        yield sites, errors
-        return
-    signs = np.stack([np.sign(plan.travel[axis]) for axis in axes], axis=-1)
-    combinations, number = np.unique(signs, axis=0, return_inverse=True)
+    moving = {parameter(key).axis for key in directional}
+    axes = [axis for axis in plan.travel if axis in moving]
+    signs = [np.sign(plan.travel[axis]) for axis in axes] or [np.zeros(len(plan.point_mm))]
+    combinations, number = np.unique(np.stack(signs, axis=-1), axis=0, return_inverse=True)
     for index, combination in enumerate(combinations):
-        yield (
-            sites[number.reshape(-1) == index],
-            _travelling(errors, dict(zip(axes, combination, strict=True))),
-        )
+        sites = np.flatnonzero(number.reshape(-1) == index)
+        travel = dict(zip(axes, combination, strict=False))
+        functions = dict(errors.functions)
+        for key, function in directional.items():
+            sign = travel.get(parameter(key).axis, 0.0)
+            if sign:
+                functions[key] = function.forward if sign > 0.0 else function.backward
+        yield sites, {n: v[sites] for n, v in plan.coordinates.items()}, ErrorSet(functions)
 
 
 def _mean_of_directions(scene: Scene) -> Model:
     return replace(scene.model, direction=TravelDirection.MEAN)
-
-
-def _travelling(errors: ErrorSet, travel: Mapping[str, float]) -> ErrorSet:
-    def chosen(key: str, function: ErrorFunction) -> ErrorFunction:
-        sign = travel.get(parameter(key).axis, 0.0)
-        if not sign or not isinstance(function, Directional):
-            return function
-        return function.forward if sign > 0.0 else function.backward
-
-    return ErrorSet({key: chosen(key, function) for key, function in errors.functions.items()})
-
-
-def _share(errors: ErrorSet, active: ErrorSet, key: str) -> float:
-    amplitude_of, active_function = errors.functions.get(key), active.functions.get(key)
-    if amplitude_of is None or active_function is None or amplitude_of is active_function:
-        return 1.0
-    amplitude = amplitude_of.amplitude
-    return active_function.amplitude / amplitude if amplitude else 1.0

@@ -12,7 +12,6 @@ import numpy as np
 from warpspace.bodies.ends import Head, Mount, WorkpieceSide
 from warpspace.bodies.mesh import LIGHT, MIDDLE, Body
 from warpspace.bodies.schematic import (
-    Colour,
     HomeAxis,
     Parts,
     Range,
@@ -69,10 +68,8 @@ class _ToolSide:
         low, high = sorted(self.zero_mm + self.sign * depth for depth in j)
         return (low, high)
 
-    def box(
-        self, frame: str, what: str, i: Range, j: Range, z: Range, colour: Colour | None = None
-    ) -> None:
-        self.parts.box(frame, what, i, self._in_r(j), z, along=self.i, colour=colour)
+    def box(self, frame: str, what: str, i: Range, j: Range, z: Range) -> None:
+        self.parts.box(frame, what, i, self._in_r(j), z, along=self.i)
 
     def stand(self, i: Range, j: Range) -> None:
         self.parts.stand(i, self._in_r(j), along=self.i)
@@ -103,13 +100,15 @@ class _Behind(_ToolSide):
             if axis.k == 2:
                 z, flange = about(middle, 1.3 * w), about(middle, 1.9 * w)
                 i, deep = self.centred(half), (start + 0.5 * u, start + 0.8 * u)
-                self.box(axis.name, "headstock", i, (start, start + 3.6 * u), z, MIDDLE)
+                self.parts.part(axis.name, "headstock", MIDDLE)
+                self.box(axis.name, "headstock", i, (start, start + 3.6 * u), z)
                 self.box(axis.name, "headstock", self.centred(half + 0.35 * u), deep, flange)
                 half, high, column_at = half + 0.1 * u, middle + reach + 2.6 * w, start + 0.8 * u
                 hangs = False
             elif axis.k == self.j and hangs:
                 j = (start, start + 2.0 * reach + 3.0 * u)
-                self.box(axis.name, "ram", self.centred(w), j, about(middle, w), LIGHT)
+                self.parts.part(axis.name, "ram", LIGHT)
+                self.box(axis.name, "ram", self.centred(w), j, about(middle, w))
                 start += 0.8 * u
             else:
                 break
@@ -117,7 +116,8 @@ class _Behind(_ToolSide):
         column_at = max(column_at or start + 0.8 * u, self.swept())
         if hangs and not axes:
             j, wide = (start, max(column_at, start) + 1.5 * u), 1.2 * w
-            self.box(BASE, "headstock", self.centred(wide), j, about(middle, wide), MIDDLE)
+            self.parts.part(BASE, "headstock", MIDDLE)
+            self.box(BASE, "headstock", self.centred(wide), j, about(middle, wide))
         self._add_column(axes, half, column_at, high)
 
     def _add_column(self, axes: list[HomeAxis], half: float, at: float, high: float) -> None:
@@ -266,7 +266,8 @@ class _Overhead(_ToolSide):
         lower, upper = max(rear.low, middle - 1.9 * u), middle + 1.5 * u
         rear_end = 2.0 * reach + max(rear.plane + 2.4 * u, self._behind(0.0) + 1.6 * u)
         i, z = self.centred(rear.half), (rear.low, rear.high)
-        self.box(name, "saddle", i, (rear.plane, front), z, LIGHT)
+        self.parts.part(name, "saddle", LIGHT)
+        self.box(name, "saddle", i, (rear.plane, front), z)
         self.box(name, "saddle", self.centred(0.92 * rear.half), (front, rear_end), (lower, upper))
         return _Rear(rear_end, lower, upper, rear.half, "ledge", reach)
 
@@ -343,10 +344,8 @@ class _Overhead(_ToolSide):
         u, bed = self.u, self.stack.bed_mm
         low = bed + (0.9 * u if foot else 0.0)
         rear.plane = max(rear.plane, self._behind(0.0))
-        i, j = (
-            self.centred(1.15 * rear.half),
-            (rear.plane, rear.plane + max(2.0 * u, 1.3 * rear.half)),
-        )
+        i = self.centred(1.15 * rear.half)
+        j = (rear.plane, rear.plane + max(2.0 * u, 1.3 * rear.half))
         self.box(name, "column", i, j, (low, rear.high + 0.3 * u))
         guides = (max(rear.low, low), rear.high)
         if guides[1] > guides[0]:

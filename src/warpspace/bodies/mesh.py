@@ -153,10 +153,8 @@ def _count_glb(data: bytes, max_triangles: int) -> None:
     stored = sum(max(int(view["byteLength"]), 0) for view in document.get("bufferViews", []))
     _check_count(stored, BYTES_PER_TRIANGLE * max_triangles, "bytes in views of its data")
     arrays = sum(
-        max(int(accessor["count"]), 0)
-        * _GLB_COLUMNS[accessor["type"]]
-        * _GLB_BYTES[accessor["componentType"]]
-        for accessor in document.get("accessors", [])
+        count * _GLB_COLUMNS[accessor["type"]] * _GLB_BYTES[accessor["componentType"]]
+        for count, accessor in zip(accessors, document.get("accessors", []), strict=True)
     )
     _check_count(arrays, BYTES_PER_TRIANGLE * max_triangles, "bytes of points and indices")
     placed = [primitive for mesh in _placed(document) for primitive in primitives[mesh]]
@@ -169,11 +167,9 @@ def _count_glb(data: bytes, max_triangles: int) -> None:
 
 
 def _placed(document: Any) -> Iterator[int]:
-    nodes = document.get("nodes", [])
-    scenes = document.get("scenes", [])
-    waiting = (
-        [(root, 1) for root in scenes[document.get("scene", 0)].get("nodes", [])] if scenes else []
-    )
+    nodes, scenes = document.get("nodes", []), document.get("scenes", [])
+    roots = scenes[document.get("scene", 0)].get("nodes", []) if scenes else []
+    waiting = [(root, 1) for root in roots]
     visited: set[int] = set()
     while waiting:
         node, depth = waiting.pop()

@@ -312,35 +312,21 @@ class Parts:
     floor: list[Array] = field(default_factory=list[Array])
     _parts: dict[str, _BodyShapes] = field(default_factory=dict[str, _BodyShapes])
 
-    def add(
-        self,
-        frame: str,
-        what: str,
-        *shapes: Shape,
-        lines_mm: Iterable[Array] = (),
-        colour: Colour | None = None,
-    ) -> None:
+    def part(self, frame: str, what: str, colour: Colour | None = None) -> _BodyShapes:
+        """Return a body of a frame; its colour is that of its first call."""
+        new = _BodyShapes(frame, colour or COLOURS[what])
+        return self._parts.setdefault(f"{frame}_{what}", new)
+
+    def add(self, frame: str, what: str, *shapes: Shape, lines_mm: Iterable[Array] = ()) -> None:
         """Add shapes and lines, [2, 3], to the body of a frame."""
-        part = self._parts.setdefault(
-            f"{frame}_{what}", _BodyShapes(frame, colour or COLOURS[what])
-        )
+        part = self.part(frame, what)
         part.shapes.extend(shapes)
         part.lines_mm.extend(lines_mm)
 
-    def box(
-        self,
-        frame: str,
-        what: str,
-        i: Range,
-        j: Range,
-        z: Range,
-        *,
-        along: int = 0,
-        colour: Colour | None = None,
-    ) -> None:
+    def box(self, frame: str, what: str, i: Range, j: Range, z: Range, *, along: int = 0) -> None:
         """Add a box: range i is along axis 0 (x) or 1 (y) of R, j along the other, in mm."""
         x, y = (j, i) if along else (i, j)
-        self.add(frame, what, box(x, y, z), colour=colour)
+        self.add(frame, what, box(x, y, z))
 
     def stand(self, i: Range, j: Range, *, along: int = 0) -> None:
         """Add a rectangle that the bed carries, its ranges as those of a box."""

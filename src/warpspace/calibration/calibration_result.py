@@ -361,25 +361,14 @@ class Calibration(Result):
         for a, b in ((0, 1), (0, 2)) if vectors else ():
             labels = (f"{'xyz'[a]} [µm]", f"{'xyz'[b]} [µm]")
             title = f"Residual vectors, {'xyz'[a]} and {'xyz'[b]}"
-            curves = (
-                Curve("", _joined(before[:, a], after[:, a]), _joined(before[:, b], after[:, b]),
-                      style="thin"),
-                Curve("before", before[:, a], before[:, b], 0, "dots"),
-                Curve("after", after[:, a], after[:, b], 1, "dots"),
-            )  # fmt: skip
-            yield Lines("plane", title, *labels, curves)
+            curves = _before_and_after(before[:, (a, b)], after[:, (a, b)])
+            yield Lines("plane", title, *labels, tuple(curves))
         for unit in (MICROMETRE, MICRORADIAN):
-            rows = sorted(
-                (row for row in self._estimates() if row.unit == unit),
-                key=lambda row: (
-                    abs(row.value - row.before) / max(row.standard_uncertainty or 1.0, 1e-12)
-                ),
-                reverse=True,
-            )[:MAX_BARS]
+            rows = [row for row in self._estimates() if row.unit == unit]
+            rows = sorted(rows, key=_significance, reverse=True)[:MAX_BARS]
             if rows:
-                spread = [
-                    row.interval_95[1] - row.value if row.interval_95 else 0.0 for row in rows
-                ]
+                highs = [row.interval_95[1] if row.interval_95 else row.value for row in rows]
+                spread = [high - row.value for high, row in zip(highs, rows, strict=True)]
                 estimates = Series([row.value for row in rows], spread=spread)
                 before_fit = Series([row.before for row in rows], as_mark=True)
                 series = (estimates, before_fit)
@@ -395,16 +384,10 @@ class Calibration(Result):
         )
         at = np.linspace(1.0, len(before), len(before))
         counts = [len(group.readings) for group in groups]
-        starts = [sum(counts[:index]) for index in range(len(counts))]
-        far = np.array(
-            [start + row for start, g in zip(starts, groups, strict=True) for row in g.outliers],
-            int,
-        )
-        curves = [
-            Curve("", _joined(at, at), _joined(before, after), style="thin"),
-            Curve("before", at, before, 0, "dots"),
-            Curve("after", at, after, 1, "dots"),
-        ]
+        starts = np.cumsum([0, *counts[:-1]])
+        outliers = [np.array(group.outliers, int) for group in groups]
+        far = np.concatenate([start + at for start, at in zip(starts, outliers, strict=True)])
+        curves = _before_and_after(np.stack([at, before], -1), np.stack([at, after], -1))
         if len(far):
             curves.append(Curve("after, outliers", at[far], after[far], 3, "dots"))
         bands: tuple[Band, ...] = ()
@@ -426,6 +409,10 @@ class Calibration(Result):
                 yield row
 
 
+def _significance(row: FittedParameter) -> float:
+    return abs(row.value - row.before) / max(row.standard_uncertainty or 1.0, 1e-12)
+
+
 def describe_target(target: Target) -> str:
     if not isinstance(target, str):
         return f"of the position error, at {place_words(dict(target))}"
@@ -442,5 +429,9 @@ def _describe_circle(circle: Circle) -> str:
     )
 
 
-def _joined(start: Array, end: Array) -> Array:
-    return np.stack([start, end, np.full(len(start), np.nan)], axis=-1).ravel()
+def _before_and_after(before: Array, after: Array) -> list[Curve]:
+    """Draw points, [n, 2], before and after the fit, and a line from one to the other."""
+    x, y = np.stack([before, after, np.full_like(before, np.nan)], axis=1).reshape(-1, 2).T
+    first = Curve("before", before[:, 0], before[:, 1], 0, "dots")
+    last = Curve("after", after[:, 0], after[:, 1], 1, "dots")
+    return [Curve("", x, y, style="thin"), first, last]

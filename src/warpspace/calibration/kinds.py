@@ -14,13 +14,12 @@ from warpspace.calibration.readings import (
     LABELS,
     Readings,
     ReadingTable,
+    axis_column,
     axis_columns,
     build_readings,
-    check_poses,
     check_spread,
 )
-from warpspace.exceptions import SceneError
-from warpspace.field.evaluate import View, build_basis, evaluate_exact
+from warpspace.field.evaluate import View, build_basis, error_values, evaluate_exact
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop
@@ -132,11 +131,8 @@ class FreePlacementKind(FromVectors):
     sign: ClassVar[float]
 
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
-        return tuple(
-            f"{self._head(session)} {letter}"
-            for session in dict.fromkeys(readings.session)
-            for letter in "xyz"
-        )
+        sessions = dict.fromkeys(readings.session)
+        return tuple(f"{self._head(session)} {x}" for session in sessions for x in "xyz")
 
     def start(self, readings: Readings) -> Array:
         member = self._members(readings, self.unknowns(readings))
@@ -155,14 +151,9 @@ class FreePlacementKind(FromVectors):
 
     def _members(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
         """Build the derivative of the readings by the unknowns, [n, 3, m]."""
-        member = np.zeros((len(readings), 3, len(unknowns)))
-        index = {name: at for at, name in enumerate(unknowns)}
-        for row, session in enumerate(readings.session):
-            for component, letter in enumerate("xyz"):
-                at = index.get(f"{self._head(session)} {letter}")
-                if at is not None:
-                    member[row, component, at] = 1.0
-        return member
+        sessions, row = np.unique(readings.session, return_inverse=True)
+        names = np.array([[f"{self._head(session)} {x}" for x in "xyz"] for session in sessions])
+        return (names[..., None] == np.array(unknowns, dtype=str)).astype(float)[row]
 
 
 _COLUMN = re.compile(
@@ -197,21 +188,18 @@ class Points(FreePlacementKind):
         if loop not in (None, *self.loops) and (
             loop != "tool" or scene.machine.branch("workpiece")
         ):
-            problem = (
+            raise table.refuse(
                 f"has column {columns[0]}; expected errors of field --loop relative without"
                 " reference (with --placed: --kind tracker)"
             )
-            raise SceneError(table.source, [problem])
         if frame and table.frame and frame != table.frame:
             problem = f"has column {columns[0]}, so its vectors are in the {frame} frame"
-            raise SceneError(table.source, [f"{problem}; expected no --frame {table.frame}"])
+            raise table.refuse(f"{problem}; expected no --frame {table.frame}")
         is_assumed = not (frame or table.frame)
-        axes = tuple(scene.machine.axes)
-        coordinates, notes = axis_columns(table, scene, axes)
+        coordinates, notes = axis_columns(table, scene)
         frame = frame or table.frame or "workpiece"
         if frame == "machine":
             observed = transforms.rotate(_from_machine(scene, coordinates), observed)
-        check_poses(coordinates, table.source)
         hint = "Do the column names state the right unit?"
         check_spread(float(np.abs(observed).max()), MAX_ERROR * 1e-3, table.source, hint)
         readings = build_readings(self.name, scene, table, coordinates, observed, notes)
@@ -246,14 +234,10 @@ class Tracker(Points):
     def _members(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
         """Build the derivative of the readings by the unknowns, [n, 3, m]."""
         member = super()._members(readings, unknowns)
-        heads = np.array([self._head(session) for session in readings.session])
-        for at, name in enumerate(unknowns):
-            head, turn, letter = name.partition(" turn ")
-            if turn:
-                lever_m = readings.nominal_mm * MM_PER_UM
-                turned = np.cross(np.eye(3)["xyz".index(letter)], lever_m)
-                member[:, :, at] = np.where((heads == head)[:, None], turned, 0.0)
-        return member
+        lever_m = readings.nominal_mm * MM_PER_UM
+        turns = super()._members(readings, tuple(name.replace(" turn ", " ") for name in unknowns))
+        turned = np.cross(turns.swapaxes(1, 2), lever_m[:, None]).swapaxes(1, 2)
+        return np.where([" turn " in name for name in unknowns], turned, member)
 
 
 def _vectors(table: ReadingTable) -> tuple[tuple[str, ...], str | None, str | None] | None:
@@ -302,14 +286,13 @@ class Lengths(FromVectors):
 
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
         observed = table.require(("length_mm",))
-        coordinates, notes = axis_columns(table, scene, tuple(scene.machine.axes))
-        check_poses(coordinates, table.source)
+        coordinates, notes = axis_columns(table, scene)
         labels = table.session if table.labels.keys() & {*LABELS} else ("1",) * len(table)
         for name in dict.fromkeys(labels):
             count = labels.count(name)
             if count < MIN_LENGTHS:
                 problem = f"station {name!r} has {count} lengths"
-                raise SceneError(table.source, [f"{problem}; expected at least {MIN_LENGTHS}"])
+                raise table.refuse(f"{problem}; expected at least {MIN_LENGTHS}")
         readings = build_readings(self.name, scene, table, coordinates, observed, notes)
         return replace(readings, session=labels)
 
@@ -358,3 +341,131 @@ def _locate(points_mm: Array, length_mm: Array) -> Array:
         for corner in corners
     )
     return min(solutions, key=lambda solution: solution.cost).x
+
+
+READ = ("x_mm", "y_mm", "z_mm")
+UNKNOWNS = ("tracker", "tracker turn", "reflector")  # mm, mrad, mm
+ITERATIONS = 50  # of the initial fit
+FIT_SPREAD_MM = 100.0  # limit of residuals after the initial fit
+STEP = 1e-3  # mm or mrad, for finite differences
+
+
+class Positions(MeasurementKind):
+    """Positions R(turn)·T·(tool point + reflector) + place, T being the pose of the tool frame.
+
+    The pose is the actual one in the workpiece frame. The turn is a full rotation vector. The
+    position of the instrument changes between sessions, the offset of the reflector does not.
+    """
+
+    name = "positions"
+    description = (
+        "positions of a reflector on the tool in the frame of a tracker; place, turn (mrad) and"
+        " offset of the reflector are unknown (also as points)"
+    )
+    columns = (
+        "an axis position each (c1_deg, …), x_mm, y_mm, z_mm, which are no axes; u_um, session"
+    )
+
+    # positions of a robot are noisy, and a reflector stands near to its last axis
+    rank_tolerance = 2e-3
+
+    def matches(self, table: ReadingTable, scene: Scene) -> bool:
+        axes = {axis_column(scene, name) for name in scene.machine.axes}
+        return set(READ) <= set(table.columns) and not axes & set(READ)
+
+    def read(self, table: ReadingTable, scene: Scene) -> Readings:
+        observed = table.require(READ)
+        coordinates, notes = axis_columns(table, scene)
+        readings = build_readings(self.name, scene, table, coordinates, observed, notes)
+        readings = replace(readings, first_fit=_first_fit(scene, readings))
+        prediction = Prediction(scene.errors, self.unknowns(readings), np.array(readings.first_fit))
+        residuals = observed - self.observe(scene, readings, prediction)
+        hint = "Are they in mm, angles in degrees, and is the machine that of the scene?"
+        check_spread(float(np.abs(residuals).max()), FIT_SPREAD_MM, table.source, hint)
+        return readings
+
+    def unknowns(self, readings: Readings) -> tuple[str, ...]:
+        heads = [
+            f"{unknown} {name}".strip()
+            for name in dict.fromkeys(readings.session)
+            for unknown in UNKNOWNS[:2]
+        ]
+        return tuple(f"{head} {x}" for head in (*heads, UNKNOWNS[2]) for x in "xyz")
+
+    def start(self, readings: Readings) -> Array:
+        return np.array(readings.first_fit)
+
+    def observe(self, scene: Scene, readings: Readings, prediction: Prediction) -> Array:
+        pose = _poses(scene, readings, prediction.errors)
+        return _reflector_mm(scene, readings, prediction, pose)
+
+    def slopes(
+        self, scene: Scene, readings: Readings, prediction: Prediction, keys: tuple[str, ...]
+    ) -> tuple[Array, Array]:
+        """Differentiate numerically: errors of a robot are too large for the first order."""
+        pose = _poses(scene, readings, prediction.errors)
+        present = _reflector_mm(scene, readings, prediction, pose)
+
+        def by_parameter(key: str) -> Array:
+            curves = dict(prediction.errors.functions)
+            curves[key] = curves[key].with_amplitude(curves[key].amplitude + 1.0)
+            changed = replace(prediction, errors=ErrorSet(curves))
+            return self.observe(scene, readings, changed) - present
+
+        def by_unknown(at: int) -> Array:
+            values = prediction.values + STEP * (np.arange(len(prediction.values)) == at)
+            changed = replace(prediction, values=values)
+            return (_reflector_mm(scene, readings, changed, pose) - present) / STEP
+
+        none = np.zeros((*present.shape, 0))
+        gains = [by_parameter(key)[..., None] for key in keys]
+        slopes = [by_unknown(at)[..., None] for at in range(len(prediction.unknowns))]
+        return np.concatenate([none, *gains], -1), np.concatenate([none, *slopes], -1)
+
+
+def _poses(scene: Scene, readings: Readings, errors: ErrorSet) -> Array:
+    """Compute the actual poses of the tool frame in the workpiece frame, [n, 4, 4]."""
+    values = error_values(scene.model, errors, readings.coordinates)
+    tool, workpiece = (
+        branch_pose(scene.model, side, readings.coordinates, values)
+        for side in ("tool", "workpiece")
+    )
+    return transforms.inverse(workpiece) @ tool
+
+
+def _reflector_mm(scene: Scene, readings: Readings, prediction: Prediction, pose: Array) -> Array:
+    unknowns = dict(zip(prediction.unknowns, prediction.values, strict=True))
+    sessions, row = np.unique(readings.session, return_inverse=True)
+
+    def vectors(unknown: str) -> Array:
+        heads = [f"{unknown} {name}".strip() for name in sessions]
+        return np.array([[unknowns[f"{head} {x}"] for x in "xyz"] for head in heads])
+
+    place, turn = (vectors(unknown) for unknown in UNKNOWNS[:2])
+    tip = np.array(scene.model.tool_point_mm) + [unknowns[f"{UNKNOWNS[2]} {x}"] for x in "xyz"]
+    turned = transforms.vector_rotation(1e-3 * turn)[row]
+    return transforms.rotate(turned, transforms.apply(pose, tip)) + place[row]
+
+
+def _first_fit(scene: Scene, readings: Readings) -> tuple[float, ...]:
+    """Fit alternately position and rotation of each session (Kabsch), and the reflector offset."""
+    from scipy.spatial.transform import Rotation
+
+    pose = _poses(scene, readings, scene.errors)
+    turn, tip = pose[:, :3, :3], np.array(scene.model.tool_point_mm)
+    sessions = np.array(readings.session)
+    members = [sessions == name for name in dict.fromkeys(readings.session)]
+    in_workpiece, placements = np.empty_like(readings.observed_mm), list[Array]()
+    for _ in range(ITERATIONS):
+        predicted, placements = transforms.apply(pose, tip), []
+        for member in members:
+            read, middle = readings.observed_mm[member], predicted[member].mean(axis=0)
+            centred = read - read.mean(axis=0)
+            rotation, *_ = Rotation.align_vectors(centred, predicted[member] - middle)
+            place = read.mean(axis=0) - rotation.apply(middle)
+            in_workpiece[member] = rotation.inv().apply(read - place)
+            placements += [place, 1e3 * rotation.as_rotvec()]
+        levers = in_workpiece - pose[:, :3, 3]
+        tip, *_ = np.linalg.lstsq(turn.reshape(-1, 3), levers.ravel(), rcond=None)
+    offset = tip - np.array(scene.model.tool_point_mm)
+    return tuple(np.concatenate([*placements, offset]).tolist())

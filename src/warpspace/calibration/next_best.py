@@ -15,7 +15,7 @@ from warpspace.calibration.calibration_result import Calibration, Candidate, Nex
 from warpspace.calibration.instruments import NO_INSTRUMENT, Instrument, common_mode
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import TestReadings
-from warpspace.calibration.spheres import solve_linear
+from warpspace.calibration.spheres import rotary_axes, solve_linear
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.field.evaluate import build_basis
 from warpspace.field.grid import build_grid
@@ -49,13 +49,8 @@ def _spans(scene: Scene) -> dict[str, tuple[float, float]]:
 
 def _complete(scene: Scene, positions: Mapping[str, Array]) -> dict[str, Array]:
     count = max(len(values) for values in positions.values())
-    rest_positions = scene.workspace.positions
-    return {
-        name: np.asarray(
-            positions[name] if name in positions else np.full(count, rest_positions[name])
-        )
-        for name in scene.machine.axes
-    }
+    complete = {**scene.workspace.positions, **positions}
+    return {name: np.broadcast_to(complete[name], (count,)) for name in scene.machine.axes}
 
 
 def _nominal(scene: Scene, kind: str, at: Mapping[str, Array], observed_mm: Array) -> Readings:
@@ -87,21 +82,17 @@ def _tests(scene: Scene) -> Iterator[Candidate]:
             yield from _test(scene, f"straightness:axis={name}:across={across}:points=11", title)
     yield from _test(scene, "diagonals", "laser along the four body diagonals")
     for plane in PLANES:
-        first, second = plane
-        if not {first, second} <= set(spans):
+        if not {*plane} <= set(spans):
             continue
         yield from _test(scene, f"squareness:plane={plane}:points=11", f"square in {plane}, probed")
-        normal = [name for name in spans if name not in (first, second)]
-        radius = 0.4 * min(spans[name][1] - spans[name][0] for name in (first, second))
+        normal = [name for name in spans if name not in plane]
+        radius = 0.4 * min(spans[name][1] - spans[name][0] for name in plane)
         options = f"circular:plane={plane}:radius={radius:g}:points={ON_CIRCLE // 2}"
         for share in PLACES[:: 2 if normal else 3]:
             at = [f"{n}={spans[n][0] + share * (spans[n][1] - spans[n][0]):g}" for n in normal]
             title = f"ball bar, circle {plane}, radius {radius:g} mm"
-            if not at:
-                yield from _test(scene, options, title)
-                continue
-            title += f" at {', '.join(at).replace('=', ' ')}"
-            yield from _test(scene, f"{options}:at={','.join(at)}", title)
+            title += f" at {', '.join(at).replace('=', ' ')}" if at else ""
+            yield from _test(scene, options + f":at={','.join(at)}" * bool(at), title)
 
 
 def _test(scene: Scene, kind: str, title: str) -> Iterator[Candidate]:
@@ -116,23 +107,21 @@ def _test(scene: Scene, kind: str, title: str) -> Iterator[Candidate]:
 def _spheres(scene: Scene) -> Iterator[Candidate]:
     at_rest = {name: np.array([value]) for name, value in scene.workspace.positions.items()}
     centre = relative_point(scene.model, at_rest)
-    rotary = [name for name, axis in scene.machine.axes.items() if not axis.is_linear]
-    travels = {name: scene.machine.axes[name].travel for name in rotary}
-    turns = {
-        name: np.array([turn for turn in TURNS_DEG if low <= turn <= high])
-        for name, (low, high) in travels.items()
-    }
-    for name in rotary:
-        for other in [axis for axis in rotary if axis != name] or [""]:
+    turns: dict[str, Array] = {}
+    for name in rotary_axes(scene):
+        low, high = scene.machine.axes[name].travel
+        turns[name] = np.array([turn for turn in TURNS_DEG if low <= turn <= high])
+    for name, angles_deg in turns.items():
+        for other in [axis for axis in turns if axis != name] or [""]:
             for turn in turns.get(other, np.zeros(1)):
-                if len(turns[name]) < 2 or (other and abs(turn) > 90.0):
+                if len(angles_deg) < 2 or (other and abs(turn) > 90.0):
                     continue
-                place = {name: turns[name]}
+                place = {name: angles_deg}
                 fixed = ""
                 if other:
-                    place[other] = np.full(len(turns[name]), turn)
+                    place[other] = np.full(len(angles_deg), turn)
                     fixed = f" at {other} {turn:g}°"
-                at, target = _complete(scene, place), np.repeat(centre, len(turns[name]), axis=0)
+                at, target = _complete(scene, place), np.repeat(centre, len(angles_deg), axis=0)
                 with suppress(SceneError):
                     at = solve_linear(scene, at, target, "")
                     inside = within_travel(scene.machine, at)
@@ -257,7 +246,7 @@ def _information(
     instrument: Instrument = NO_INSTRUMENT,
 ) -> Array:
     by_parameter, by_unknown = model.derivatives(parameters, parameters.start, model.start())
-    weights = np.concatenate(model.weights(noise_mm))[:, None]
+    weights = model.weights(noise_mm)[:, None]
     common = [common_mode(model, contribution) for contribution in instrument.shared]
     jacobian = weights * np.hstack([by_parameter, *common])
     jacobian = solve.project_out(jacobian, solve.orthonormal_basis(weights * by_unknown))

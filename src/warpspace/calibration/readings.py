@@ -44,14 +44,18 @@ class ReadingTable:
     def __len__(self) -> int:
         return len(self.lines)
 
+    def refuse(self, problem: str) -> SceneError:
+        return SceneError(self.source, [problem])
+
     def require(self, names: Sequence[str]) -> Array:
         """Return required columns, [n, len(names)]; raise SceneError where one is missing."""
         missing = [name for name in names if name not in self.columns]
         if missing:
             present = ", ".join((*self.labels, *self.columns)) or "none"
             problem = f"has no column {', '.join(missing)}{near_miss(missing[0], self.columns)}"
-            expected = f"expected {', '.join(names)} (columns in the file: {present})"
-            raise SceneError(self.source, [f"{problem}; {expected}"])
+            raise self.refuse(
+                f"{problem}; expected {', '.join(names)} (columns in the file: {present})"
+            )
         return np.column_stack([self.columns[name] for name in names])
 
     @property
@@ -95,8 +99,7 @@ def parse_reading_table(text: str, source: str) -> ReadingTable:
     )
     count = len(set(table.session))
     if count > MAX_SESSIONS:
-        problem = f"names {count:,} sessions; expected at most {MAX_SESSIONS}"
-        raise SceneError(source, [problem])
+        raise table.refuse(f"names {count:,} sessions; expected at most {MAX_SESSIONS}")
     return table
 
 
@@ -183,10 +186,15 @@ def axis_column(scene: Scene, name: str) -> str:
 
 
 def axis_columns(
-    table: ReadingTable, scene: Scene, names: Sequence[str], needed: Sequence[str] = ()
+    table: ReadingTable, scene: Scene, names: Sequence[str] = (), turning: Sequence[str] = ()
 ) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """Read the positions of all axes, [n], from columns such as ``b_deg``, and notes on them."""
+    """Read the positions of all axes, [n], from columns such as ``b_deg``, and notes on them.
+
+    By default all axes may have a column. Some axis, of those that turn where these are named, has
+    to move.
+    """
     axes = scene.machine.axes
+    names = names or tuple(axes)
     columns = {name: axis_column(scene, name) for name in axes}
     coordinates: dict[str, Array] = {}
     notes: list[str] = []
@@ -202,12 +210,13 @@ def axis_columns(
     for column in table.columns:
         head, _, unit = column.removeprefix("axis_").rpartition("_")
         if unit == "deg" and head not in heads and head.upper() not in axes:
-            rotary = ", ".join(heads).upper()
-            problem = f"has column {column}, but the machine has no axis {head.upper()}"
-            raise SceneError(table.source, [f"{problem}; expected {rotary or 'no rotary axis'}"])
-    if needed and not any(name in coordinates for name in needed):
-        names_deg = ", ".join(f"{name.lower()}_deg" for name in needed)
-        raise SceneError(table.source, [f"has no axis positions; expected a column of {names_deg}"])
+            raise table.refuse(
+                f"has column {column}, but the machine has no axis {head.upper()}; expected"
+                f" {', '.join(heads).upper() or 'no rotary axis'}"
+            )
+    if turning and not any(name in coordinates for name in turning):
+        names_deg = ", ".join(f"{name.lower()}_deg" for name in turning)
+        raise table.refuse(f"has no axis positions; expected a column of {names_deg}")
     ranges = {name: (float(at.min()), float(at.max())) for name, at in coordinates.items()}
     notes += coverage_notes(scene, ranges)
     if missing:
@@ -216,6 +225,11 @@ def axis_columns(
     for name in axes:
         if name not in coordinates:
             coordinates[name] = np.full(len(table), scene.workspace.positions[name])
+    if all(np.ptp(coordinates[name]) < 1e-9 for name in turning or axes):
+        raise table.refuse(
+            "has all readings at one pose: errors are confounded with the set-up; expected axes"
+            " that move between readings"
+        )
     return coordinates, tuple(notes)
 
 
@@ -227,17 +241,9 @@ def build_readings(
     observed_mm: Array,
     notes: tuple[str, ...],
 ) -> Readings:
-    return Readings(
-        kind,
-        coordinates,
-        relative_point(scene.model, coordinates),
-        observed_mm,
-        uncertainties_mm(table),
-        table.session,
-        table.lines,
-        table.source,
-        notes,
-    )
+    nominal_mm, sigma_mm = relative_point(scene.model, coordinates), uncertainties_mm(table)
+    rows = table.session, table.lines, table.source
+    return Readings(kind, coordinates, nominal_mm, observed_mm, sigma_mm, *rows, notes)
 
 
 def uncertainties_mm(table: ReadingTable) -> Array | None:
@@ -248,16 +254,9 @@ def uncertainties_mm(table: ReadingTable) -> Array | None:
             for line, value in zip(table.lines, values, strict=True):
                 if value <= 0.0:
                     problem = f"line {line}, {name} = {value / factor:g}"
-                    raise SceneError(table.source, [f"{problem}; expected a number above 0"])
+                    raise table.refuse(f"{problem}; expected a number above 0")
             return values
     return None
-
-
-def check_poses(coordinates: Mapping[str, Array], source: str) -> None:
-    """Raise SceneError where all readings were taken at one pose."""
-    if all(np.ptp(values) < 1e-9 for values in coordinates.values()):
-        problem = "has all readings at one pose: errors are confounded with the set-up"
-        raise SceneError(source, [f"{problem}; expected axes that move between readings"])
 
 
 def check_spread(spread_mm: float, limit_mm: float, source: str, hint: str) -> None:

@@ -11,8 +11,14 @@ from warpspace.analysis.options import Option
 from warpspace.bench.base import BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table
 from warpspace.bench.plan import BenchPlan, respond, simulate
-from warpspace.calibration.kinds import Lengths, MeasurementKind, Points, Prediction, Tracker
-from warpspace.calibration.positions import Positions
+from warpspace.calibration.kinds import (
+    Lengths,
+    MeasurementKind,
+    Points,
+    Positions,
+    Prediction,
+    Tracker,
+)
 from warpspace.calibration.readings import (
     Readings,
     ReadingTable,
@@ -72,18 +78,11 @@ class TestReadings(MeasurementKind):
     def _readings(
         self, plan: BenchPlan, read_um: Array, source: str, lines: tuple[int, ...]
     ) -> Readings:
-        return Readings(
-            self._text,
-            {name: values[plan.site] for name, values in plan.coordinates.items()},
-            plan.point_mm[plan.site],
-            read_um[:, None] * MM_PER_UM,
-            None,
-            (source,) * len(lines),
-            lines,
-            source,
-            (f"{self.test.title}: {plan.place}",),
-            plan=plan,
-        )
+        coordinates = {name: values[plan.site] for name, values in plan.coordinates.items()}
+        arrays = coordinates, plan.point_mm[plan.site], read_um[:, None] * MM_PER_UM, None
+        notes = (f"{self.test.title}: {plan.place}",)
+        rows = (source,) * len(lines), lines, source
+        return Readings(self._text, *arrays, *rows, notes, plan=plan)
 
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
         return tuple(f"{readings.source} {name}" for name in _plan(readings).setup)
@@ -109,11 +108,11 @@ def _plan(readings: Readings) -> BenchPlan:
 
 def _set_up(readings: Readings, unknowns: tuple[str, ...]) -> Array:
     set_up: Mapping[str, Array] = {
-        f"{readings.source} {name}": column for name, column in _plan(readings).setup.items()
+        f"{readings.source} {name}": row for name, row in _plan(readings).setup.items()
     }
     none = np.zeros(len(readings))
     columns = [set_up.get(name, none) for name in unknowns]
-    return np.stack(columns, -1) if columns else np.zeros((len(none), 0))
+    return np.column_stack([np.zeros((len(none), 0)), *columns])
 
 
 def _value(option: Option, text: str, test: str) -> Any:

@@ -67,20 +67,17 @@ def find_rank(
     largest = norms.max(initial=0.0)
     units = project_out(by_parameter / np.where(norms > 0.0, norms, 1.0), set_up)
     independent: list[int] = []
-    basis: list[Array] = []
+    basis = np.zeros((len(units), 0))
     without_effect: list[str] = []
     dependent: dict[str, Mapping[str, float]] = {}
     for at, key in enumerate(keys):
         if norms[at] <= RANK_TOLERANCE * largest or not norms[at]:
             without_effect.append(key)
             continue
-        remainder = units[:, at]
-        for _ in range(2):  # twice: the second pass removes rounding
-            for direction in basis:
-                remainder = remainder - direction * (direction @ remainder)
+        remainder = project_out(units[:, at], basis)
         if np.linalg.norm(remainder) > rank_tolerance:
             independent.append(at)
-            basis.append(remainder / np.linalg.norm(remainder))
+            basis = np.column_stack([basis, remainder / np.linalg.norm(remainder)])
             continue
         dependent[key] = {}
         if independent and np.linalg.norm(units[:, at]) > rank_tolerance:
@@ -219,12 +216,8 @@ def automatic_parameters(scene: Scene, sets: Sequence[Readings]) -> tuple[str, .
 def is_straightness(key: str) -> bool:
     """Check for a straightness error, whose slope is confounded with a squareness."""
     row = parameter(key)
-    return (
-        not row.is_constant
-        and not row.is_rotation
-        and is_linear(row.axis)
-        and row.direction != direction_index(row.axis)
-    )
+    is_translation = not row.is_constant and not row.is_rotation and is_linear(row.axis)
+    return is_translation and row.direction != direction_index(row.axis)
 
 
 CheckCancelled = Callable[[], object]
@@ -291,14 +284,17 @@ class MeasurementModel:
             by_unknown.append(set_up.reshape(size, len(self.unknowns)))
         return np.vstack(by_parameter), np.vstack(by_unknown)
 
-    def weights(self, otherwise_mm: float = 1.0) -> list[Array]:
-        """Return the weight of each component of each reading, [n·d], 1/mm."""
+    def weighted(self, components: Sequence[Array], otherwise_mm: float = 1.0) -> list[Array]:
+        """Multiply the components of readings, [n, d] each, by their weights, 1/mm."""
+        sigmas = (np.array(otherwise_mm) if r.sigma_mm is None else r.sigma_mm for r in self.sets)
         return [
-            np.full(readings.observed_mm.size, 1.0 / otherwise_mm)
-            if readings.sigma_mm is None
-            else np.repeat(1.0 / readings.sigma_mm, readings.observed_mm.shape[1])
-            for readings in self.sets
+            row * (1.0 / sigma)[..., None] for row, sigma in zip(components, sigmas, strict=True)
         ]
+
+    def weights(self, otherwise_mm: float = 1.0) -> Array:
+        """Return the weight of each component of each reading, [N], 1/mm."""
+        ones = [np.ones_like(readings.observed_mm) for readings in self.sets]
+        return np.concatenate([row.ravel() for row in self.weighted(ones, otherwise_mm)])
 
     @property
     def positions(self) -> dict[str, Array]:
@@ -329,10 +325,6 @@ def rms_mm(residuals: Sequence[Array]) -> float:
     return float(np.sqrt(np.mean(lengths**2)))
 
 
-def by_name(unknowns: Sequence[str], values: Array) -> dict[str, float]:
-    return {name: float(value) for name, value in zip(unknowns, values, strict=True)}
-
-
 ROBUST_SCALE = 1.345  # standard deviations at which the soft L1 loss starts to reduce the weight
 MAD = 1.4826  # standard deviation of a normal distribution per median absolute deviation
 MAX_ROUNDS = 20  # times that a robust fit updates its weights
@@ -359,7 +351,7 @@ def solve(
 ) -> Solved:
     from scipy.optimize import OptimizeResult, least_squares
 
-    weights = np.concatenate(model.weights())
+    weights = model.weights()
     count = len(parameters.keys)
     start = np.concatenate([parameters.start, model.start() if unknown is None else unknown])
     if not len(start):
@@ -369,10 +361,6 @@ def solve(
         rows = model.residuals(parameters, values[:count], values[count:])
         return np.concatenate([row.ravel() for row in rows]) * weights
 
-    def slopes(values: Array) -> Array:
-        columns = model.derivatives(parameters, values[:count], values[count:])
-        return -weights[:, None] * np.hstack(columns)
-
     trust, unit = np.ones(model.size), None
     dof = max(model.size - len(start) + (0 if prior is None else count), 1)
 
@@ -381,7 +369,8 @@ def solve(
         return rows if prior is None else np.append(rows, (values[:count] - prior[0]) / prior[1])
 
     def jacobian(values: Array) -> Array:
-        rows = np.sqrt(trust)[:, None] * slopes(values)
+        columns = model.derivatives(parameters, values[:count], values[count:])
+        rows = np.sqrt(trust)[:, None] * (-weights[:, None] * np.hstack(columns))
         if prior is None:
             return rows
         set_ups = np.zeros((count, len(values) - count))

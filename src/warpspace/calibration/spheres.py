@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.analysis.axis_motion import fit_flat_circle
+from warpspace.bench.placing import linear_axes
 from warpspace.calibration.kinds import FreePlacementKind
 from warpspace.calibration.readings import (
     Circle,
@@ -12,7 +13,6 @@ from warpspace.calibration.readings import (
     ReadingTable,
     axis_columns,
     build_readings,
-    check_poses,
     check_spread,
 )
 from warpspace.exceptions import SceneError
@@ -73,7 +73,6 @@ class SphereTcp(Centres):
         observed = table.require(READ)
         rotary = rotary_axes(scene)
         coordinates, notes = axis_columns(table, scene, rotary, rotary)
-        check_poses({name: coordinates[name] for name in rotary}, table.source)
         hint = "Were they measured with TCP correction off (--kind sphere), or in another unit?"
         check_spread(spread_mm(table), TCP_SPREAD_MM, table.source, hint)
         coordinates = solve_linear(scene, coordinates, mean_centres(observed, table), table.source)
@@ -97,18 +96,15 @@ class SphereKind(Centres):
         rotary = rotary_axes(scene)
         linear = tuple(name for name in ("X", "Y", "Z") if name in scene.machine.axes)
         if len(linear) < len(READ):
-            problem = "holds positions of X, Y and Z"
-            raise SceneError(table.source, [f"{problem}; expected a machine with these three axes"])
+            raise table.refuse(
+                "holds positions of X, Y and Z; expected a machine with these three axes"
+            )
         coordinates, notes = axis_columns(table, scene, (*rotary, *linear), rotary)
-        check_poses({name: coordinates[name] for name in rotary}, table.source)
         circles = circles_of(table, scene)
         for circle in circles:
             if circle.against:
-                coordinates[circle.axis] = np.where(
-                    np.isin(table.session, circle.sessions),
-                    -coordinates[circle.axis],
-                    coordinates[circle.axis],
-                )
+                sense = np.where(np.isin(table.session, circle.sessions), -1.0, 1.0)
+                coordinates[circle.axis] = sense * coordinates[circle.axis]
                 note = (
                     f"run {', '.join(circle.sessions)}: {circle.axis} rotates opposite to that"
                     " of the scene; its positions are used with the opposite sign"
@@ -136,8 +132,8 @@ def has_centres(table: ReadingTable, scene: Scene) -> bool:
 
 def spread_mm(table: ReadingTable) -> float:
     observed, labels = table.require(READ), np.array(table.session)
-    groups = [labels == name for name in dict.fromkeys(table.session)]
-    return max(float(np.ptp(observed[group], axis=0).max()) for group in groups)
+    names = dict.fromkeys(table.session)
+    return max(float(np.ptp(observed[labels == name], axis=0).max()) for name in names)
 
 
 def mean_centres(observed_mm: Array, table: ReadingTable) -> Array:
@@ -155,17 +151,11 @@ def solve_linear(
     scene: Scene, coordinates: dict[str, Array], target_mm: Array, source: str
 ) -> dict[str, Array]:
     """Find the positions of the linear axes that nominally bring the tool point to targets."""
-    one_per_direction: dict[int, str] = {}
-    for name, axis in scene.machine.axes.items():
-        if axis.is_linear:
-            one_per_direction.setdefault(direction_index(name), name)
-    linear = list(one_per_direction.values())
+    linear = list(linear_axes(scene.machine).values())
     zero = {**coordinates, **{name: np.zeros(len(target_mm)) for name in linear}}
     start = relative_point(scene.model, zero)
-    columns = [
-        relative_point(scene.model, {**zero, name: np.ones(len(target_mm))}) - start
-        for name in linear
-    ]
+    ones = np.ones(len(target_mm))
+    columns = [relative_point(scene.model, {**zero, name: ones}) - start for name in linear]
     system = np.stack(columns, -1) if columns else np.zeros((len(target_mm), 3, 0))
     solved = np.linalg.pinv(system) @ (target_mm - start)[..., None]
     missed_mm = float(np.abs(system @ solved - (target_mm - start)[..., None]).max())
@@ -191,9 +181,7 @@ def circles_of(table: ReadingTable, scene: Scene) -> tuple[Circle, ...]:
             runs.setdefault(moving[0], []).append(session)
     circles: list[Circle] = []
     for axis, sessions in runs.items():
-        groups: list[tuple[str, ...]] = [(session,) for session in sessions]
-        if len(sessions) > 1:
-            groups.append(tuple(sessions))
+        groups = dict.fromkeys([*((session,) for session in sessions), tuple(sessions)])
         for group in groups:
             members = np.isin(labels, group)
             circles.append(_fit(axis, group, read[members], turned[axis][members], scene))
@@ -213,13 +201,7 @@ def _fit(
     complex_mm = (flat - centre) @ np.array([1.0, 1j])
     along = abs(np.vdot(turn, complex_mm))
     against = abs(np.vdot(np.conj(turn), complex_mm))
-    return Circle(
-        axis,
-        sessions,
-        "XYZ"[first] + "XYZ"[second],
-        (float(centre[0]), float(centre[1])),
-        radius,
-        float(np.sqrt(np.mean(away**2))),
-        len(flat),
-        bool(against > along),
-    )
+    plane, middle = "XYZ"[first] + "XYZ"[second], (float(centre[0]), float(centre[1]))
+    rms_mm = float(np.sqrt(np.mean(away**2)))
+    is_against = bool(against > along)
+    return Circle(axis, sessions, plane, middle, radius, rms_mm, len(flat), is_against)

@@ -8,12 +8,7 @@ import numpy as np
 from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.analysis.description import to_json
 from warpspace.analysis.statistics import statistics, volume_statistics
-from warpspace.analysis.uncertainty.propagation import (
-    field_uncertainty,
-    u95_columns,
-    u95_lines,
-    volume_uncertainty,
-)
+from warpspace.analysis.uncertainty import propagation
 from warpspace.cli import shared_options
 from warpspace.cli.analyses import print_blocks
 from warpspace.cli.tables import print_text, progress
@@ -22,18 +17,11 @@ from warpspace.field.evaluate import ErrorField, View, placed_words
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
 from warpspace.kinematics.model import complete_coordinates
 from warpspace.picture.formatting import direction_words, point_axes, spell_at, spell_point
-from warpspace.scene.model import (
-    Scene,
-    choose_view,
-    evaluate,
-    evaluate_grid,
-    second_order,
-)
+from warpspace.scene import model
 from warpspace.units import Array
 
 MAX_LISTED = 20
 POINTS_AT_ONCE = 5000  # points that are converted to JSON at a time
-FIELDS = (".parquet", ".npz", ".csv", ".vts")
 
 
 def print_field(
@@ -54,30 +42,30 @@ def print_field(
     if points and grid is not None:
         raise OptionError("--at and --grid exclude each other; use one of them")
     if points and output is not None and output.lower().endswith(".vts"):
-        endings = ", ".join(ending for ending in FIELDS if ending != ".vts")
+        endings = ", ".join(ending for ending in shared_options.FIELDS if ending != ".vts")
         raise OptionError(
             f"{output}: a .vts file holds a grid, --at defines points; expected {endings}"
         )
     files = [path for path in (csv_path, output) if path is not None]
     loaded = shared_options.load_placed(scene, direction, loop, placed=placed)
-    view = choose_view(loaded, loop, frame)
+    view = model.choose_view(loaded, loop, frame)
     with progress("evaluating", silent=as_json):
         axes, result, nodes = _evaluate(loaded, points, grid, view, exact=exact)
         places = axes if nodes is None else None
         estimate: dict[str, float] = {}
         if not exact:
-            estimate = shared_options.warn_second_order(second_order(loaded, loop, at=places))
+            estimate = shared_options.warn_second_order(model.second_order(loaded, loop, at=places))
         node_statistics = statistics(result, axes)
         u95 = {}
         if nodes is None:
-            uncertainty = field_uncertainty(loaded, result.error_um, axes, view)
+            uncertainty = propagation.field_uncertainty(loaded, result.error_um, axes, view)
             summary = node_statistics
             u95 = uncertainty.columns if uncertainty and uncertainty.errors.is_known else {}
         else:
-            uncertainty = volume_uncertainty(loaded, view, max(nodes.shape))
+            uncertainty = propagation.volume_uncertainty(loaded, view, max(nodes.shape))
             summary = volume_statistics(result, nodes)
             if files or as_json:
-                u95 = u95_columns(loaded, result, axes, view, nodes.point_mm)
+                u95 = propagation.u95_columns(loaded, result, axes, view, nodes.point_mm)
         summary = uncertainty.with_expanded_uncertainty(summary) if uncertainty else summary
     if files:
         from warpspace.outputs.exports.fields import FieldRecord, write_field
@@ -90,27 +78,23 @@ def print_field(
     if as_json:
         document: dict[str, object] = {"loop": view.loop, "frame": frame}
         document["statistics"] = to_json(summary)
-        document |= {} if view.placed_over is None else {"placement": "fitted out"}
+        if view.placed_over is not None:
+            document["placement"] = "fitted out"
         document |= estimate
-        document |= {} if view.reference is None else {"reference": dict(view.reference)}
+        if view.reference is not None:
+            document["reference"] = dict(view.reference)
         if nodes is not None:
             document["statistics_nodes"] = to_json(node_statistics)
         if output is not None:
             size = {"output": output, "points_written": result.norm_um.size}
             click.echo(shared_options.spell_json({**size, **document}))
             return
-        document |= (
-            {"unknown": uncertainty.errors.unknown}
-            if uncertainty and uncertainty.errors.unknown
-            else {}
-        )
+        if uncertainty and uncertainty.errors.unknown:
+            document["unknown"] = uncertainty.errors.unknown
         if nodes is None and uncertainty and u95:
             u95["covariance_um2"] = uncertainty.covariance_um2
-            u95 |= (
-                {}
-                if loaded.limit_um is None
-                else {"probability": uncertainty.conformance_probability(loaded.limit_um)}
-            )
+            if loaded.limit_um is not None:
+                u95["probability"] = uncertainty.conformance_probability(loaded.limit_um)
         _print_json(axes, result, document, u95)
         return
     conditions = (*direction_words(loaded), *placed_words(view))
@@ -124,7 +108,7 @@ def print_field(
         f"  {result.norm_um.size} points{volume}: mean {summary.mean_um:.2f},"
         f" RMS {summary.rms_um:.2f}, P95 {summary.p95_um:.2f}, max {summary.max_um:.2f} µm"
     )
-    for line in u95_lines(uncertainty and uncertainty.errors, {"": summary}):
+    for line in propagation.u95_lines(uncertainty and uncertainty.errors, {"": summary}):
         print_text(line)
     if nodes is not None:
         print_text(f"  each node counted once: mean {node_statistics.mean_um:.2f} µm")
@@ -136,26 +120,20 @@ def print_field(
 
 
 def _evaluate(
-    scene: Scene, points: tuple[str, ...], grid: int | None, view: View, *, exact: bool
+    scene: model.Scene, points: tuple[str, ...], grid: int | None, view: View, *, exact: bool
 ) -> tuple[Mapping[str, Array], ErrorField, Grid | None]:
-
     if points:
         typed = [shared_options.parse_point(text, scene.machine.axes) for text in points]
         full = [
             complete_coordinates(scene.machine, point, scene.workspace.positions) for point in typed
         ]
         axes = {name: np.array([point[name] for point in full]) for name in scene.machine.axes}
-        error_field = evaluate(scene, at=axes, loop=view.loop, exact=exact, frame=view.frame)
+        error_field = model.evaluate(scene, at=axes, loop=view.loop, exact=exact, frame=view.frame)
         for point in typed:
             shared_options.warn_outside_travel(scene.machine, point)
         return axes, error_field, None
-    nodes = DEFAULT_NODES if grid is None else grid
-    sampled_grid = build_grid(scene.model, scene.workspace, nodes)
-    return (
-        sampled_grid.coordinates,
-        evaluate_grid(scene, sampled_grid, view, exact=exact),
-        sampled_grid,
-    )
+    nodes = build_grid(scene.model, scene.workspace, DEFAULT_NODES if grid is None else grid)
+    return nodes.coordinates, model.evaluate_grid(scene, nodes, view, exact=exact), nodes
 
 
 def _print_json(
@@ -187,13 +165,8 @@ def _print_json(
             for place, row in zip(places, numbers, strict=True)
         ]
         click.echo((", " if start else "") + shared_options.spell_json(rows)[1:-1], nl=False)
-    click.echo(
-        "]"
-        + "".join(
-            f', "{name}": {shared_options.spell_json(part)}' for name, part in document.items()
-        )
-        + "}"
-    )
+    entries = [f', "{name}": {shared_options.spell_json(part)}' for name, part in document.items()]
+    click.echo(f"]{''.join(entries)}}}")
 
 
 def _list_points(

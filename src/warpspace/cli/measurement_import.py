@@ -13,14 +13,9 @@ from warpspace.cli.file_arguments import check_files
 from warpspace.cli.shared_options import SCENES, print_json, write_text
 from warpspace.cli.tables import echo, print_table, print_text, progress
 from warpspace.exceptions import OptionError
+from warpspace.formats import registry
 from warpspace.formats.kinds import csv_own
 from warpspace.formats.measured import summarise_errors, summary_table
-from warpspace.formats.registry import (
-    ReadOptions,
-    open_files,
-    parse_axis_options,
-    read_errors,
-)
 from warpspace.formats.registry import formats as all_formats
 from warpspace.formats.to_scene import base_scene, build_imported_scene
 from warpspace.machine.axes import is_axis_name
@@ -83,13 +78,13 @@ def import_files(
         return
 
     scenes = [machine] if machine and machine not in machine_names() else []
-    axis, names = parse_axis_options(axes)
+    axis, names = registry.parse_axis_options(axes)
     with progress("reading", silent=as_json):
         base = base_scene(machine) if machine else None
-        options = ReadOptions(
+        options = registry.ReadOptions(
             base.machine if base else None, axis, names, sign or "", variant or ""
         )
-        reading = read_errors(open_files(files), options, format_name or "")
+        reading = registry.read_errors(registry.open_files(files), options, format_name or "")
         source = files[0].name if len(files) == 1 else f"{files[0].name} and {len(files) - 1} more"
         if base is not None and (title or not scenes):
             base = replace(base, title=one_line(title or files[0].stem), name=Path(output).stem)

@@ -61,7 +61,6 @@ def edit_notes(
 
 
 def _add_note(name: str, path: str, point: str | None, *, force: bool, **about: Any) -> Scene:
-
     file = scene_path(name)
     with lock_file(file):
         original, scene = read_bytes(file, MAX_SCENE_BYTES), load_scene(file)

@@ -7,13 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import click
 
-from warpspace.cli.shared_options import (
-    ROWS,
-    draw_figure_file,
-    output_option,
-    plot_option,
-    size_option,
-)
+from warpspace.cli import shared_options
 from warpspace.exceptions import OptionError, WorkersLostError
 from warpspace.machine.limits import LOCAL_WORKERS
 
@@ -57,7 +51,9 @@ def run_concepts(
         raise OptionError("--plot draws machines side by side; expected two scenes or more")
     comparison = concepts.run_all(scenes, watch)
     if plot is not None:
-        draw_figure_file("concepts", scenes, settings, plot, force=force, silent=True)
+        shared_options.draw_figure_file(
+            "concepts", scenes, settings, plot, force=force, silent=True
+        )
     return comparison
 
 
@@ -187,8 +183,8 @@ def _machine_table(
 EXTRA_OPTIONS: dict[str, tuple[tuple[Callable[..., Any], ...], Callable[..., Any]]] = {
     "concepts": (
         (
-            plot_option("machines side by side"),
-            size_option("1600x1200", "Width and height of the picture in px."),
+            shared_options.plot_option("machines side by side"),
+            shared_options.size_option("1600x1200", "Width and height of the picture in px."),
         ),
         run_concepts,
     ),
@@ -206,10 +202,10 @@ EXTRA_OPTIONS: dict[str, tuple[tuple[Callable[..., Any], ...], Callable[..., Any
                 help="Run on the workers of a Dask cluster, for instance tcp://host:8786."
                 " Needs the extra `cluster`.",
             ),
-            output_option(
+            shared_options.output_option(
                 "|E| of every machine as a table, or the rows of all combinations: .parquet or"
                 " .csv.",
-                *ROWS,
+                *shared_options.ROWS,
                 required=False,
             ),
         ),

@@ -13,16 +13,7 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.commands.concepts import Concepts
 from warpspace.analysis.description import Result
-from warpspace.app.documents import offline_page
-from warpspace.app.documents.legend import (
-    look_words,
-    marked,
-    numbers_words,
-    picture_conditions,
-    projected_labels,
-    range_conditions,
-    state_conditions,
-)
+from warpspace.app.documents import legend, offline_page
 from warpspace.app.documents.output_services import CancelledError, Services
 from warpspace.app.documents.scene_file import file_notes, reopened
 from warpspace.app.documents.transfers import shown_sides
@@ -57,7 +48,6 @@ _renderers = threading.Semaphore(MAX_RENDERERS)
 
 
 def build_services() -> "Services":
-
     return Services(
         draw_figure,
         draw_view,
@@ -72,7 +62,8 @@ def build_services() -> "Services":
 
 def draw_figure(picture: "LivePicture", figure: str, cancelled: threading.Event) -> bytes:
     """Draw a figure of the picture of a page as a PNG."""
-    return _render(*_figure_of(picture, figure), cancelled)
+    drawing = _figure_of(picture, figure)
+    return _run_worker(lambda worker: worker.begin(*drawing), cancelled)
 
 
 def _figure_of(
@@ -93,10 +84,10 @@ def _figure_of(
         )
     state, tilts = picture.state, picture.tilts
     name = figure or ("orientation-map" if tilts else "error-map")
-    conditions, fixed = state_conditions(sides[0]), state.look.range_mode == "fixed"
+    conditions, fixed = legend.state_conditions(sides[0]), state.look.range_mode == "fixed"
     top: float | None = picture.scale.high
     if len(sides) == 2:
-        name, conditions = "comparison", conditions_of_both(*map(state_conditions, sides))
+        name, conditions = "comparison", conditions_of_both(*map(legend.state_conditions, sides))
         # the change has its own colours, whichever of the three the page shows
         top = top if fixed and not tilts else None
     settings = FigureSettings(
@@ -120,13 +111,13 @@ def draw_view(
     cancelled: threading.Event,
 ) -> bytes:
     """Draw the view of a page as a PNG with title, scale and statistics."""
-    from warpspace.outputs.view import draw_view as draw
+    from warpspace.outputs.figure_files import draw_view as draw
 
     statistics = picture.statistics
     numbers = {"mean": statistics.mean_um, "P95": statistics.p95_um, "max": statistics.max_um}
-    caption, px_per_mm = projected_labels(picture, camera, *pixels.shape[:2])
+    caption, px_per_mm = legend.projected_labels(picture, camera, *pixels.shape[:2])
     arguments = (
-        pixels, picture.title, look_words(picture), picture.scale, marked(picture),
+        pixels, picture.title, legend.look_words(picture), picture.scale, legend.marked(picture),
         [(f"{n} {picture.length_words}", f"{spell(v)} µm") for n, v in numbers.items()],
         None if px_per_mm is None else (px_per_mm, picture.exaggeration), caption,
         picture.state.shown.dark,
@@ -138,7 +129,7 @@ def draw_concepts(
     scenes: "Sequence[Scene]", plan: "Concepts", dark: bool, cancelled: threading.Event
 ) -> bytes:
     settings = FigureSettings(dark=dark, loop=str(plan.loop), concepts=plan)
-    return _render("concepts", scenes, settings, cancelled)
+    return _run_worker(lambda worker: worker.begin("concepts", scenes, settings), cancelled)
 
 
 def draw_compensation(
@@ -148,12 +139,6 @@ def draw_compensation(
         lambda worker: worker.begin_chart("maps", MAPS, "png", compensation, dark, narrow),
         cancelled,
     )
-
-
-def _render(
-    name: str, scenes: "Sequence[Scene]", settings: "FigureSettings", cancelled: threading.Event
-) -> bytes:
-    return _run_worker(lambda worker: worker.begin(name, scenes, settings, "png"), cancelled)
 
 
 def _run_worker(
@@ -171,7 +156,6 @@ def _run_worker(
 
 @contextmanager
 def _renderer_slot(cancelled: threading.Event) -> Generator[None]:
-
     while not _renderers.acquire(timeout=POLL_S):
         if cancelled.is_set():
             raise CancelledError("cancelled while waiting for a renderer")
@@ -192,7 +176,7 @@ def write_export(picture: "LivePicture", ending: str) -> bytes:
             component=picture.component,
             quantity=picture.quantity,
             colours=picture.scale,
-            conditions=(*state_conditions(side), *range_conditions(picture)),
+            conditions=(*legend.state_conditions(side), *legend.range_conditions(picture)),
         )
         for side in shown_sides(picture)
     )
@@ -265,7 +249,6 @@ def _check_size(picture: "ScenePicture") -> None:
 def embed_view(
     scene: "Scene", *, exaggeration: float, nodes: int, loop: str, largest: float
 ) -> str:
-
     live = offline_page.offline_picture(
         scene, exaggeration=exaggeration, nodes=nodes, loop=Loop(loop), largest=largest
     )
@@ -294,8 +277,9 @@ def build_story(scene: "Scene", nodes: int) -> "list[Step]":
             )
         conditions = (
             picture.compared.title if picture.compared else "", picture.scale.label,
-            *look_words(picture)[:2], VIEW_WORDS.get(view, "oblique view"),
-            numbers_words(picture), *picture_conditions(picture), *picture.state.notes,
+            *legend.look_words(picture)[:2], VIEW_WORDS.get(view, "oblique view"),
+            legend.numbers_words(picture), *legend.picture_conditions(picture),
+            *picture.state.notes,
         )  # fmt: skip
         caption = f"Step {len(steps) + 1} of {len(notes)}: {' '.join(note.text.split())}"
         caption += f" (note {scene.review.index(note) + 1}; {' · '.join(filter(None, conditions))})"

@@ -57,6 +57,14 @@ def run_by(place: str) -> Callable[[Callable[[], None]], Callable[..., None]]:
     return decorate
 
 
+def choice_option(
+    name: str, choices: Iterable[str], about: str, default: str | None = None, **traits: Any
+) -> Decorator:
+    """Build an option with one of some values; the help shows its default, if any."""
+    kind, shown = click.Choice([*choices]), default is not None
+    return click.option(name, type=kind, default=default, show_default=shown, help=about, **traits)
+
+
 json_option = click.option(
     "--json", "as_json", is_flag=True, help="Print exactly one JSON object on stdout."
 )
@@ -68,11 +76,12 @@ placed_option = click.option(
     help="Remove the best-fit placement of the workpiece: three shifts and three small rotations"
     " that minimise the RMS error over the working volume. Uses the relative loop.",
 )
-loop_option = click.option(
+loop_option = choice_option(
     "--loop",
-    type=click.Choice(LOOPS),
-    help="Structural loop: tool point, workpiece point, or tool relative to workpiece.  [relative"
-    " where an axis carries the workpiece, else tool]",
+    LOOPS,
+    "Structural loop: tool point, workpiece point, or tool relative to workpiece.  [relative where"
+    " an axis carries the workpiece, else tool]",
+    None,
 )
 direction_option = click.option(
     "--direction",
@@ -181,6 +190,7 @@ def spell_json(value: object) -> str:
     return escape_json(text)
 
 
+FIELDS = (".parquet", ".npz", ".csv", ".vts")
 FIGURES = (".png", ".svg", ".pdf")
 ROWS = (".parquet", ".csv")
 SCENES = (".toml",)
@@ -258,13 +268,7 @@ def figure_options(size: str | None = "1600x1200", sizes: str = "") -> Decorator
     options = (
         component_option,
         exaggeration_option,
-        click.option(
-            "--view",
-            type=click.Choice(VIEWS),
-            default="iso",
-            show_default=True,
-            help="Position of the camera.",
-        ),
+        choice_option("--view", VIEWS, "Position of the camera.", "iso"),
         size_option(size, f"Width and height of the picture in px.{sizes}"),
         loop_option,
         placed_option,

@@ -13,16 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from warpspace.field.grid import (
-    NODES,
-    Grid,
-    Workspace,
-    build_grid,
-    cell_values,
-    cut,
-    cut_all,
-    pieces,
-)
+from warpspace.field import grid as grids
 from warpspace.kinematics import chain, transforms
 from warpspace.kinematics.components import join, rotate, split, split_rows, subtract
 from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
@@ -78,7 +69,7 @@ class ErrorField:
 
         Percentiles and shares of the volume are computed from it, for any number of nodes.
         """
-        return cell_values(self.norm_um)
+        return grids.cell_values(self.norm_um)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +120,7 @@ MIN_EFFECT = 1e-12
 """Share of the largest effect, squared, below which a combination of the six is not fitted."""
 
 
-def fit_placement(model: Model, grid: Grid, error_um: Array) -> Array:
+def fit_placement(model: Model, grid: grids.Grid, error_um: Array) -> Array:
     """Fit the placement of the workpiece, [..., 6], µm and µrad, to relative errors over a volume.
 
     Errors, [..., nx, ny, nz, 3], µm, are absolute, in R; leading axes are independent fits.
@@ -180,7 +171,7 @@ class View:
     reference: Mapping[str, float] | None = None
     # working volume over which the placement of the workpiece is fitted out of a relative error,
     # before the reference is subtracted; None without a fit
-    placed_over: Workspace | None = None
+    placed_over: grids.Workspace | None = None
 
 
 class SecondOrder(NamedTuple):
@@ -261,7 +252,7 @@ def build_basis(
     point = chain.nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
     placement = None
     if view.placed_over is not None:
-        volume = build_grid(model, view.placed_over)
+        volume = grids.build_grid(model, view.placed_over)
         at, nodes = volume.coordinates, volume.point_mm
         response = _shaped_jacobian(model, errors, keys, at, view, nodes)[0]
         placement = fit_placement(model, volume, response)
@@ -315,7 +306,7 @@ def find_placement(
     """Fit the placement of the workpiece, [6], µm and µrad; None where a view has none."""
     if view.placed_over is None:
         return None
-    volume = build_grid(model, view.placed_over)
+    volume = grids.build_grid(model, view.placed_over)
     field = evaluate_field(
         model, errors, volume.coordinates, View(view.loop), volume.point_mm, exact=exact
     )
@@ -346,14 +337,12 @@ def evaluate_field(
     point = chain.nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
     shape = (*np.broadcast_shapes(batch_shape(coordinates), point.shape[:-1]), 3)
     error, orientation = np.empty(shape), np.empty(shape)
-    reference = reference_point(model, view, coordinates)
-    if reference is None:
-        fixed = np.zeros(3)
-    else:
-        reference_at, reference_mm = reference
+    reference, fixed = reference_point(model, view, coordinates), np.zeros(3)
+    if reference is not None:
         unreferenced = replace(view, frame="machine", reference=None)
+        at, point_of_reference = reference
         fixed = evaluate_field(
-            model, errors, reference_at, unreferenced, reference_mm, exact=exact
+            model, errors, at, unreferenced, point_of_reference, exact=exact
         ).error_um
     placement = find_placement(model, errors, view, exact=exact)
 
@@ -361,19 +350,19 @@ def evaluate_field(
         return chain.build_links(model, at, error_values(model, errors, at), exact=exact)
 
     # A grid has few positions of each axis: the links of all of them are computed once.
-    is_shared = all(positions.size <= NODES for positions in coordinates.values())
+    is_shared = all(positions.size <= grids.NODES for positions in coordinates.values())
     links = steps(coordinates) if is_shared else None
-    for piece in pieces(shape[:-1]):
-        at = {name: cut(values, piece) for name, values in coordinates.items()}
-        piece_links = steps(at) if links is None else cut_all(links, piece)
+    for piece in grids.pieces(shape[:-1]):
+        at = {name: grids.cut(values, piece) for name, values in coordinates.items()}
+        piece_links = steps(at) if links is None else grids.cut_all(links, piece)
         nodes = (*piece, slice(None))
         error_um, tilt = chain.solve_links(
-            piece_links, view.loop, split(cut(point, nodes)), exact=exact
+            piece_links, view.loop, split(grids.cut(point, nodes)), exact=exact
         )
         if placement is not None:
-            placed = map(split, placement_effect(model, placement, at, cut(point, nodes)))
+            placed = map(split, placement_effect(model, placement, at, grids.cut(point, nodes)))
             error_um, tilt = map(subtract, (error_um, tilt), placed)
-        error_um = subtract(error_um, split(cut(fixed, nodes)))
+        error_um = subtract(error_um, split(grids.cut(fixed, nodes)))
         rotation = _result_rotation(model, view, at)
         if rotation is not None:
             error_um, tilt = (rotate(split_rows(rotation), vectors) for vectors in (error_um, tilt))

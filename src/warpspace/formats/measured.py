@@ -22,7 +22,6 @@ from warpspace.machine.axes import (
     is_linear,
     parameter,
 )
-from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.simple import Directional
 from warpspace.machine.curves.table import TableCurve, TwoArguments
 from warpspace.machine.definition import Machine
@@ -31,6 +30,7 @@ from warpspace.units import Array
 
 FORWARD, BACKWARD, UNDIRECTED = 1, -1, 0
 """Direction of travel of a reading; undirected where a file does not state it."""
+SIGNS = {FORWARD: "+", BACKWARD: "-", UNDIRECTED: ""}
 REPEATABILITY = 4.0  # ISO 230-2, 3.17: unidirectional repeatability in standard deviations
 Matrix = tuple[tuple[float, ...], ...]
 
@@ -139,10 +139,9 @@ class ErrorSurface:
     def table(self, direction: int) -> Array:
         """Return the values of a direction of travel, the mean of both for 0, (first, second)."""
         forward = np.array(self.values)
-        backward = np.array(self.backward) if self.backward else forward
-        return {FORWARD: forward, BACKWARD: backward, UNDIRECTED: (forward + backward) / 2.0}[
-            direction
-        ]
+        backward = np.array(self.backward or self.values)
+        mean = (forward + backward) / 2.0
+        return {FORWARD: forward, BACKWARD: backward, UNDIRECTED: mean}[direction]
 
 
 def surface_from_directions(
@@ -298,7 +297,27 @@ class ErrorSummary:
 
 
 def summarise_errors(imported: ImportedErrors) -> list[ErrorSummary]:
-    rows = [_series_summary(series) for series in imported.series]
+    rows: list[ErrorSummary] = []
+    for series in imported.series:
+        values, reversal, repeatability = series.values, series.reversal, series.repeatability
+        if repeatability is not None and np.isnan(repeatability).all():
+            repeatability = None
+        directions = {run.direction for run in series.runs if run.direction}
+        rows.append(
+            ErrorSummary(
+                key=series.key,
+                kind="table" if reversal is None else "by direction",
+                points=len(series.positions),
+                runs=len(series.runs),
+                directions=" ".join(SIGNS[code] for code in sorted(directions, reverse=True)),
+                range=(series.positions[0], series.positions[-1]),
+                smallest=float(values.min()),
+                largest=float(values.max()),
+                mean_reversal=None if reversal is None else float(reversal.mean()),
+                repeatability=None if repeatability is None else float(np.nanmax(repeatability)),
+                uncertainty=max(series.uncertainty) if series.uncertainty else None,
+            )
+        )
     for surface in imported.surfaces:
         values = surface.table(UNDIRECTED)
         rows.append(
@@ -351,28 +370,6 @@ def summary_table(imported: ImportedErrors) -> blocks.Table:
     return blocks.Table(columns, rows)
 
 
-def _series_summary(series: ErrorSeries) -> ErrorSummary:
-    values, reversal, repeatability = series.values, series.reversal, series.repeatability
-    if repeatability is not None and np.isnan(repeatability).all():
-        repeatability = None
-    directions = {run.direction for run in series.runs}
-    return ErrorSummary(
-        key=series.key,
-        kind="table" if reversal is None else "by direction",
-        points=len(series.positions),
-        runs=len(series.runs),
-        directions=" ".join(
-            sign for sign, code in (("+", FORWARD), ("-", BACKWARD)) if code in directions
-        ),
-        range=(series.positions[0], series.positions[-1]),
-        smallest=float(values.min()),
-        largest=float(values.max()),
-        mean_reversal=None if reversal is None else float(reversal.mean()),
-        repeatability=None if repeatability is None else float(np.nanmax(repeatability)),
-        uncertainty=max(series.uncertainty) if series.uncertainty else None,
-    )
-
-
 RUN_DIRECTION = {TravelDirection.FORWARD: FORWARD, TravelDirection.BACKWARD: BACKWARD}
 POSITION_TOLERANCE = 1e-9  # mm or degrees; nearer positions are equal
 Point = tuple[SourceLine, float, float, float]  # line, position of both axes, value
@@ -386,10 +383,6 @@ class ErrorTable:
     keys: tuple[str, ...]
     # positions, direction, and a value for each key
     rows: list[tuple[tuple[float, ...], int, Sequence[float]]]
-
-    @property
-    def directed(self) -> bool:
-        return any(direction != UNDIRECTED for _, direction, _ in self.rows)
 
 
 def zero_key(scene: Scene) -> str:
@@ -413,62 +406,36 @@ def sample_errors(corrections: RequiredCorrections) -> ImportedErrors:
             continue
         count = corrections.points.get(row.axis) or max(corrections.points.values())
         at = np.linspace(*scene.axis_span(row.axis), count)
-        curves = _curves_by_direction(curve)
-        other = _second_axis(curve)
-        tabled = all(
-            isinstance(part, TableCurve | TwoArguments) for part in curves.values() or [curve]
-        )
-        if tabled and (other is not None or len(curve.kinks) <= count):
+        parts = {UNDIRECTED: curve}
+        if isinstance(curve, Directional):
+            parts = {FORWARD: curve.forward, BACKWARD: curve.backward}
+        planes = [part for part in parts.values() if isinstance(part, TwoArguments)]
+        axes = {plane.axes[1] for plane in planes}
+        is_surface = len(axes) == 1
+        is_table = all(isinstance(part, TableCurve | TwoArguments) for part in parts.values())
+        if is_table and (is_surface or len(curve.kinks) <= count):
             at = np.array(curve.kinks)
-        elif other is not None:
+        elif is_surface:
             at = np.union1d(at, curve.kinks)
-        if other is not None:
-            axis, places = other
+        if is_surface:
+            (axis,) = axes
+            places = np.unique(np.concatenate([plane.positions[1] for plane in planes]))
             arguments = {row.axis: at[:, None], axis: places}
             shape = (len(at), len(places))
             tables = {
-                direction: np.broadcast_to(part.evaluate_at(row.axis, arguments), shape)
-                for direction, part in {FORWARD: curve, BACKWARD: curve, **curves}.items()
+                direction: np.broadcast_to(
+                    parts.get(direction, curve).evaluate_at(row.axis, arguments), shape
+                )
+                for direction in (FORWARD, BACKWARD)
             }
             surfaces.append(surface_from_directions(key, (row.axis, axis), (at, places), tables))
         else:
             runs = tuple(
                 MeasuredRun(1, direction, tuple(np.asarray(part.evaluate(at)).tolist()))
-                for direction, part in (curves or {UNDIRECTED: curve}).items()
+                for direction, part in parts.items()
             )
             series.append(ErrorSeries(key, tuple(at.tolist()), runs))
     return ImportedErrors("scene", tuple(series), tuple(surfaces), constants)
-
-
-def to_single_direction(
-    imported: ImportedErrors, corrections: RequiredCorrections
-) -> ImportedErrors:
-    """Return errors by direction of travel as values for the direction of the scene."""
-    direction = RUN_DIRECTION.get(TravelDirection(corrections.scene.model.direction), UNDIRECTED)
-    series = [
-        ErrorSeries.undirected(error.key, error.positions, error.in_direction(direction))
-        for error in imported.series
-    ]
-    surfaces = [
-        replace(error, values=tuple(map(tuple, error.table(direction).tolist())), backward=())
-        for error in imported.surfaces
-    ]
-    return replace(imported, series=tuple(series), surfaces=tuple(surfaces))
-
-
-def _curves_by_direction(curve: ErrorFunction) -> dict[int, ErrorFunction]:
-    if not isinstance(curve, Directional):
-        return {}
-    return {FORWARD: curve.forward, BACKWARD: curve.backward}
-
-
-def _second_axis(curve: ErrorFunction) -> tuple[str, Array] | None:
-    curves = (curve, *_curves_by_direction(curve).values())
-    surfaces = [part for part in curves if isinstance(part, TwoArguments)]
-    axes = {surface.axes[1] for surface in surfaces}
-    if len(axes) != 1:
-        return None
-    return axes.pop(), np.unique(np.concatenate([surface.positions[1] for surface in surfaces]))
 
 
 def build_error_tables(imported: ImportedErrors) -> list[ErrorTable]:
@@ -484,20 +451,19 @@ def build_error_tables(imported: ImportedErrors) -> list[ErrorTable]:
         table = ErrorTable((axis,), tuple(error.key for error in errors), [])
         for direction in (FORWARD, BACKWARD) if directed else (UNDIRECTED,):
             columns = [
-                np.interp(at, error.positions, error.in_direction(direction)) for error in errors
+                np.interp(at, error.positions, error.in_direction(direction)).tolist()
+                for error in errors
             ]
-            numbers = np.stack(columns, axis=-1).tolist()
-            rows = zip(at.tolist(), numbers, strict=True)
-            table.rows.extend(((q,), direction, row) for q, row in rows)
+            for q, *numbers in zip(at.tolist(), *columns, strict=True):
+                table.rows.append(((q,), direction, numbers))
         tables.append(table)
     for surface in imported.surfaces:
         table = ErrorTable(surface.axes, (surface.key,), [])
         points = list(product(surface.first, surface.second))
         for direction in (FORWARD, BACKWARD) if surface.backward else (UNDIRECTED,):
             matrix = surface.backward if direction == BACKWARD else surface.values
-            cells = chain.from_iterable(matrix)
-            rows = zip(points, cells, strict=True)
-            table.rows.extend((point, direction, (error,)) for point, error in rows)
+            for point, error in zip(points, chain.from_iterable(matrix), strict=True):
+                table.rows.append((point, direction, (error,)))
         tables.append(table)
     return tables
 

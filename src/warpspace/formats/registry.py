@@ -52,7 +52,9 @@ class ReadOptions:
         """Find the axis of the machine behind a name in a file: X1, MX1 and X mean X."""
         bare = name.strip().strip('"').upper()
         assigned = self.names.get(bare, "")
-        candidates = [assigned] if assigned else _candidates(bare)
+        stem = bare.removeprefix("M").rstrip("0123456789")
+        names = (bare, stem) if len(stem) == 1 else (bare,)
+        candidates = [assigned] if assigned else [name for name in names if is_axis_name(name)]
         matches = [axis for axis in candidates if len(axis) == 1 or assigned]
         if self.machine is not None:
             matches = [axis for axis in candidates if axis in self.machine.axes]
@@ -64,6 +66,14 @@ class ReadOptions:
             problem = f"the machine {chain} has no axis {bare!r}, it has {axes}"
             at.refuse(problem if assigned else f"{problem} ({advice})")
         return matches[0]
+
+    def axis_of_file(self, source: Source, expected: str) -> str:
+        """Return the axis that the user names, else that of the letter at the end of the name."""
+        letter = source.stem.upper().rsplit("_", 1)[-1]
+        axis = self.axis or (letter if len(letter) == 1 and is_axis_name(letter) else "")
+        if not axis:
+            source.refuse("does not state its axis", expected)
+        return self.axis_named(axis, source)
 
 
 @dataclass(frozen=True)
@@ -138,14 +148,6 @@ def has_pattern(pattern: str) -> Callable[[str, str], bool]:
     return lambda head, _: expression.search(head) is not None
 
 
-def _candidates(bare: str) -> list[str]:
-    candidates = [bare] if is_axis_name(bare) else []
-    stem = bare.removeprefix("M").rstrip("0123456789")
-    if len(stem) == 1 and is_axis_name(stem) and stem not in candidates:
-        candidates.append(stem)
-    return candidates
-
-
 def parse_axis_options(texts: Sequence[str]) -> tuple[str, dict[str, str]]:
     axis, names = "", {}
     for text in texts:
@@ -193,13 +195,11 @@ def recognise(sources: Sequence[Source]) -> Format:
         kind = next((kind for kind in formats() if kind.recognise(head, name)), None)
         if kind is None:
             names = ", ".join(kind.name for kind in formats())
-            first = next((line for line in source.lines if line.strip()), "")
-            number = source.lines.index(first) + 1 if first else None
-            problem = f"{source.at(number).quoted if number else 'nothing'} matches no known format"
-            expected = (
-                f"one of {names} (--format NAME selects it; `warpspace import --formats` lists"
-            )
-            (source.at(number) if number else source).refuse(problem, f"{expected} their contents)")
+            hint = "(--format NAME selects it; `warpspace import --formats` lists their contents)"
+            expected = f"one of {names} {hint}"
+            for at, _ in source.scan():
+                at.refuse(f"{at.quoted} matches no known format", expected)
+            source.refuse("nothing matches no known format", expected)
         recognised[kind.name] = kind
         if len(recognised) > 1:
             names = " and ".join(recognised)

@@ -3,7 +3,7 @@
 import io
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NoReturn
 
@@ -12,9 +12,7 @@ from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM
 from warpspace.scene.text_files import CsvRows, one_line, parse_number
 
 UM_PER: Mapping[str, float] = {
-    "um": 1.0,
-    "µm": 1.0,
-    "μm": 1.0,
+    **dict.fromkeys(("um", "µm", "μm"), 1.0),
     "mm": 1e3,
     "nm": 1e-3,
     "m": 1e6,
@@ -23,14 +21,11 @@ UM_PER: Mapping[str, float] = {
 }
 """Micrometres per unit of length."""
 URAD_PER: Mapping[str, float] = {
-    "urad": 1.0,
-    "µrad": 1.0,
-    "μrad": 1.0,
+    **dict.fromkeys(("urad", "µrad", "μrad"), 1.0),
     "mrad": 1e3,
     "rad": 1e6,
     "arcsec": math.pi / 180.0 / 3600.0 * 1e6,
-    "deg": math.pi / 180.0 * 1e6,
-    "°": math.pi / 180.0 * 1e6,
+    **dict.fromkeys(("deg", "°"), math.pi / 180.0 * 1e6),
     "um/m": 1.0,
     "µm/m": 1.0,
     "mm/m": 1e3,
@@ -104,7 +99,7 @@ class Source:
         return self.base.rsplit(".", 1)[0]
 
     def refuse(self, problem: str, expected: str = "") -> NoReturn:
-        raise SceneError(self.name, [_joined(problem, expected)])
+        raise SceneError(self.name, [f"{problem}; expected {expected}" if expected else problem])
 
     def rows(self, max_rows: int) -> CsvRows:
         """Read a table with a header and at most so many rows."""
@@ -179,13 +174,9 @@ class SourceLine:
             self.refuse(f"{quantity} in {quote(unit)}", f"one of the units {units}")
         return factors[unit]
 
-    def ascending(self, value: float, before: Sequence[float], quantity: str, of: str = "") -> None:
-        if before and value <= before[-1]:
-            self.refuse(f"{quantity} {value:g}{of} after {before[-1]:g}", "ascending positions")
-
-
-def _joined(problem: str, expected: str) -> str:
-    return f"{problem}; expected {expected}" if expected else problem
+    def ascending(self, value: float, before: float, quantity: str, of: str = "") -> None:
+        if value <= before:
+            self.refuse(f"{quantity} {value:g}{of} after {before:g}", "ascending positions")
 
 
 def quote(text: str) -> str:
@@ -229,9 +220,8 @@ def _decoded(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
         try:
             return content.decode(encoding), ("read as UTF-16",)
         except UnicodeDecodeError:
-            raise SceneError(
-                name, ["begins as UTF-16 text, but is not valid; expected a text file"]
-            ) from None
+            problem = "begins as UTF-16 text, but is not valid; expected a text file"
+            raise SceneError(name, [problem]) from None
     try:
         return content.decode("utf-8-sig"), ()
     except UnicodeDecodeError as error:

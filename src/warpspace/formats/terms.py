@@ -6,7 +6,7 @@ interpolation, the behaviour at the ends and the direction of travel are those o
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -19,9 +19,6 @@ from warpspace.machine.axes import is_linear, sort_axes
 from warpspace.machine.definition import Machine, build_machine
 from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
 
-HOLD_ENDS, MODULO, EXTRAPOLATE = "held", "modulo", "extended"
-"""Extrapolation of a table: its end values, its period, or its last segment."""
-
 
 @dataclass(frozen=True)
 class AxisTable:
@@ -32,7 +29,7 @@ class AxisTable:
     positions: tuple[float, ...]  # (n,), mm or degrees; ascending
     # (n,), mm or degrees; corrections of the target, those for forward travel if `backward` is set
     values: tuple[float, ...]
-    ends: str = HOLD_ENDS  # "held", "modulo" (the period is that of the table) or "extended"
+    is_modulo: bool = False  # repeated with the period of the table; otherwise its ends are held
     # (n,); values for travel in the negative direction; empty if they are the same
     backward: tuple[float, ...] = ()
     direction: int = 0  # 1 or −1 if it acts in one direction of travel only, else 0
@@ -54,7 +51,10 @@ class AxisTable:
             correction = self.at(position, self.direction)
             return correction / 2.0 if direction == 0 else np.zeros_like(correction)
         values = self.backward if self.backward and direction < 0 else self.values
-        return interpolate(np.asarray(position, dtype=float), self.positions, values, self.ends)
+        first, last = self.positions[0], self.positions[-1]
+        if self.is_modulo and last > first:
+            position = first + np.mod(position - first, last - first)
+        return np.interp(position, self.positions, values)
 
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> dict[str, Array]:
         """Return the corrections of commanded positions, mm or degrees, by axis."""
@@ -90,8 +90,7 @@ class Grid3:
     """Corrections of three axes at the points of a grid, trilinear between them."""
 
     axes: tuple[str, str, str]
-    # (3, n); ascending, of each axis
-    positions: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
+    positions: tuple[tuple[float, ...], ...]  # (3, n); ascending, of each axis
     # [n1, n2, n3, 3], mm; corrections; beyond the grid those of its boundary
     values: Array
 
@@ -100,9 +99,14 @@ class Grid3:
         return int(self.values.size)
 
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> dict[str, Array]:
+        from scipy.interpolate import RegularGridInterpolator
+
         del direction
         points = np.broadcast_arrays(*(coordinates[axis] for axis in self.axes))
-        interpolated = trilinear(points, self.positions, self.values)
+        pairs = zip(points, self.positions, strict=True)
+        clipped = np.stack([np.clip(at, along[0], along[-1]) for at, along in pairs], axis=-1)
+        positions = tuple(map(np.array, self.positions))
+        interpolated = RegularGridInterpolator(positions, self.values)(clipped)
         return {axis: interpolated[..., index] for index, axis in enumerate(self.axes)}
 
 
@@ -131,31 +135,6 @@ Term: TypeAlias = AxisTable | Product | Grid3 | Affine
 """One additive term of a controller's compensation."""
 
 
-def interpolate(position: Array, at: Sequence[float], values: Sequence[float], ends: str) -> Array:
-    places, heights = np.asarray(at, dtype=float), np.asarray(values, dtype=float)
-    if ends == MODULO and len(places) > 1:
-        period = places[-1] - places[0]
-        position = places[0] + np.mod(position - places[0], period)
-    inside = np.interp(position, places, heights)
-    if ends != EXTRAPOLATE or len(places) < 2:
-        return inside
-    low = (heights[1] - heights[0]) / (places[1] - places[0])
-    high = (heights[-1] - heights[-2]) / (places[-1] - places[-2])
-    below = np.minimum(position - places[0], 0.0) * low
-    return inside + below + np.maximum(position - places[-1], 0.0) * high
-
-
-def trilinear(
-    points: Sequence[Array], positions: Sequence[Sequence[float]], values: Array
-) -> Array:
-    """Interpolate in a grid of three axes; beyond it with the values of its boundary."""
-    from scipy.interpolate import RegularGridInterpolator
-
-    pairs = zip(points, positions, strict=True)
-    clipped = np.stack([np.clip(point, along[0], along[-1]) for point, along in pairs], axis=-1)
-    return RegularGridInterpolator(tuple(map(np.array, positions)), values)(clipped)
-
-
 @dataclass(frozen=True)
 class Tables:
     """The compensation of a controller, as read from its files."""
@@ -163,7 +142,7 @@ class Tables:
     terms: tuple[Term, ...]  # their corrections are added
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-    units: tuple[str, ...] = field(default=("mm",))
+    units: tuple[str, ...] = ("mm",)
 
     @property
     def size(self) -> int:
@@ -206,14 +185,13 @@ def errors_from_tables(
         elif isinstance(term, Affine):
             _affine(term, machine, constants, curves)
     series, surfaces = _merged(series, surfaces, source)
+    series = [
+        error for error in series if np.any(np.abs([run.values for run in error.runs]) > NEGLIGIBLE)
+    ]
     assumed = (*tables.assumed, f"the table corrects the entire error{carried}")
     return measured.ImportedErrors(
         name,
-        tuple(
-            error
-            for error in series
-            if np.any(np.abs([run.values for run in error.runs]) > NEGLIGIBLE)
-        ),
+        tuple(series),
         tuple(surfaces),
         constants,
         units=tables.units,

@@ -11,10 +11,10 @@ from warpspace.exceptions import OptionError, SceneError
 from warpspace.formats.measured import (
     BACKWARD,
     FORWARD,
+    SIGNS,
     ErrorSeries,
     ErrorSurface,
     ImportedErrors,
-    MeasuredRun,
 )
 from warpspace.formats.registry import Reading
 from warpspace.kinematics.model import Model
@@ -36,7 +36,6 @@ TRAVEL_TOLERANCE = 1e-6  # mm or degrees; tolerance of positions beyond the trav
 IMPLAUSIBLE = {False: 1000.0, True: 5000.0}
 """µm of a translation and µrad of a rotation above which a note questions the unit of the file."""
 T = TypeVar("T")
-SIGNS = {FORWARD: "+", BACKWARD: "-"}
 
 
 @dataclass(frozen=True)
@@ -105,10 +104,10 @@ def build_imported_scene(
         description=description,
     )
     text = scene_to_toml(scene)
-    if len(text.encode()) > MAX_SCENE_BYTES:
-        size = len(text.encode()) / 1e6
-        problem = f"results in a scene of {size:.1f} MB"
-        raise SceneError(name, [f"{problem}; expected at most {MAX_SCENE_BYTES / 1e6:.1f} MB"])
+    size = len(text.encode())
+    if size > MAX_SCENE_BYTES:
+        limit = f"expected at most {MAX_SCENE_BYTES / 1e6:.1f} MB"
+        raise SceneError(name, [f"results in a scene of {size / 1e6:.1f} MB; {limit}"])
     parsed = parse_scene(text, base.name, name)
     return ImportedScene(parsed, text, (*notes, *convention_notes))
 
@@ -181,9 +180,8 @@ def _curves(imported: ImportedErrors, base: Scene, name: str) -> dict[str, Error
     for error in (*imported.series, *imported.surfaces):
         if error.key in curves:
             raise SceneError(name, [f"{error.key} is repeated; expected each error once"])
-        curves[error.key] = (
-            _curve(error, base) if isinstance(error, ErrorSeries) else _surface(error, base, name)
-        )
+        is_series = isinstance(error, ErrorSeries)
+        curves[error.key] = _curve(error, base) if is_series else _surface(error, base, name)
     problems = Problems()
     for key, description in imported.curves.items():
         axis = parameter(key).axis
@@ -199,10 +197,8 @@ def _curve(series: ErrorSeries, base: Scene) -> ErrorFunction:
     span = base.axis_span(parameter(series.key).axis)
     forward, backward = series.mean(FORWARD), series.mean(BACKWARD)
     if forward is not None and backward is not None and np.any(forward != backward):
-        forward_curve, backward_curve = (
-            _table(span, series.positions, values.tolist()) for values in (forward, backward)
-        )
-        return Directional(span, forward_curve, backward_curve)
+        tables = (_table(span, series.positions, at.tolist()) for at in (forward, backward))
+        return Directional(span, *tables)
     return _table(span, series.positions, series.values.tolist())
 
 
@@ -235,15 +231,13 @@ def _measured(
             span = base.axis_span(parameter(series.key).axis)
             uncertainty[series.key] = _table(span, series.positions, series.uncertainty)
         if keep_runs and len(series.runs) > 1:
-            runs = tuple(_travel_run(series.positions, run) for run in series.runs)
-            measured[series.key] = Measurement(runs)
+            runs: list[TravelRun] = []
+            for run in series.runs:
+                pairs = zip(series.positions, run.values, strict=True)
+                points = tuple((q, error) for q, error in pairs if not math.isnan(error))
+                runs.append(TravelRun(SIGNS[run.direction], points))
+            measured[series.key] = Measurement(tuple(runs))
     return uncertainty, measured
-
-
-def _travel_run(positions: Sequence[float], run: MeasuredRun) -> TravelRun:
-    pairs = zip(positions, run.values, strict=True)
-    points = tuple((q, error) for q, error in pairs if not math.isnan(error))
-    return TravelRun(SIGNS.get(run.direction, ""), points)
 
 
 def _convention(imported: ImportedErrors, base: Scene) -> tuple[Model, list[str]]:

@@ -53,9 +53,7 @@ class ColourScale:
     @property
     def ticks(self) -> tuple[float, ...]:
         """Round values to label, from the low to the high end."""
-        step = nice_step(self.high - self.low)
-        first, last = math.ceil(self.low / step - 1e-9), math.floor(self.high / step + 1e-9)
-        return tuple(round(step * i, 12) for i in range(first, last + 1))
+        return tuple(_multiples(nice_step(self.high - self.low), self.low, self.high))
 
 
 @cache
@@ -70,6 +68,11 @@ def nice_step(span: float) -> float:
     raw = span / _INTERVALS
     decade = 10.0 ** math.floor(math.log10(raw))
     return next(step * decade for step in _STEPS if step * decade >= raw * (1.0 - 1e-9))
+
+
+def _multiples(step: float, low: float, high: float) -> list[float]:
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [round(step * number, 12) for number in range(first, last + 1)]
 
 
 def component_values(error: Array, component: str) -> Array:
@@ -95,11 +98,10 @@ def build_scale(
     if math.isfinite(largest) and largest > 0.0:
         step = nice_step(largest if component == "norm" else 2.0 * largest)
         top = step * math.ceil(largest / step * (1.0 - 1e-9))
-    if end is not None:
-        top = end
+    top = top if end is None else end
     if component == "norm":
         label = f"|{quantity}_B − {quantity}_A|" if change else f"|{quantity}|"
-        return ColourScale(0.0, top, diverging=False, label=label, unit=unit)
+        return ColourScale(0.0, top, label=label, unit=unit)
     label = f"{quantity}_{component}{', B − A' if change else ''}"
     return ColourScale(-top, top, diverging=True, label=label, unit=unit)
 
@@ -125,5 +127,4 @@ def tick_values(low: float, high: float, max_count: float) -> list[float]:
     step = nice_step(span)
     while span / step > max(max_count, 2.0):
         step = nice_step(10.0 * step * 1.01)
-    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-    return [round(step * number, 10) for number in range(first, last + 1)]
+    return _multiples(step, low, high)

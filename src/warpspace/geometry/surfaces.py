@@ -60,15 +60,10 @@ def outer_surface(shape: Shape) -> Surface:
 
 def triangulate(faces: list[Index]) -> Surface:
     """Triangulate patches [a, b] of nodes that turn outwards into one surface."""
-    if not faces:
-        return Surface(np.zeros(0, dtype=np.intp), np.zeros((0, 3), dtype=np.intp))
-    triangles: list[Index] = []
+    triangles: list[Index] = [np.zeros((0, 3), dtype=np.intp)]
     for face in faces:
         a, b, c, d = face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]
-        triangles += [
-            np.stack([a, b, c], -1).reshape(-1, 3),
-            np.stack([a, c, d], -1).reshape(-1, 3),
-        ]
+        triangles += [np.stack(vertices, -1).reshape(-1, 3) for vertices in ((a, b, c), (a, c, d))]
     nodes, numbered = np.unique(np.concatenate(triangles), return_inverse=True)
     return Surface(nodes, numbered.reshape(-1, 3))
 
@@ -86,19 +81,12 @@ def grid_lines(shape: Shape, spacing: tuple[int, int, int]) -> list[Index]:
     for axis in range(3):
         if shape[axis] == 1:
             continue
-        first, second = (other for other in range(3) if other != axis)
-        for i, j in product(
-            _line_indices(shape[first], spacing[first]),
-            _line_indices(shape[second], spacing[second]),
-        ):
-            on_face = i in (0, shape[first] - 1) or j in (0, shape[second] - 1)
-            if on_face:
+        across = [other for other in range(3) if other != axis]
+        drawn = [sorted({*range(0, shape[at], spacing[at]), shape[at] - 1}) for at in across]
+        for i, j in product(*drawn):
+            if i in (0, shape[across[0]] - 1) or j in (0, shape[across[1]] - 1):
                 lines.append(np.moveaxis(numbers, axis, -1)[i, j])
     return lines
-
-
-def _line_indices(count: int, spacing: int) -> list[int]:
-    return sorted({*range(0, count, spacing), count - 1})
 
 
 def line_spacing(shape: Shape) -> Shape:
@@ -226,10 +214,8 @@ def _half(upper: int, middle: int) -> slice:
 
 
 def face_axis(face: Index, shape: Shape) -> int:
-    ends = np.stack(np.unravel_index(face[[0, -1], [0, -1]], shape), -1)
-    other = np.stack(np.unravel_index(face[[0, -1], [-1, 0]], shape), -1)
-    is_constant = (ends[0] == ends[1]) & (other[0] == other[1])
-    return int(np.argmax(is_constant))
+    at = np.stack(np.unravel_index(face, shape))  # [3, a, b]
+    return int(np.argmax((at == at[:, :1, :1]).all(axis=(1, 2))))
 
 
 def crease_lines(faces: Sequence[Index], shape: Shape) -> list[Index]:

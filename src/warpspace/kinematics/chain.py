@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from warpspace.kinematics import components, transforms
 from warpspace.kinematics.components import Rows, Triple
 from warpspace.kinematics.model import TOOL_AXIS, AxisFrames, Coordinates, Loop, Model, batch_shape
-from warpspace.machine.axes import DIRECTIONS, Parameter, axis_parameters, parameter
-from warpspace.machine.definition import Axis, Vector
+from warpspace.machine.axes import DIRECTIONS, parameter
+from warpspace.machine.definition import Axis
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, UM_PER_MM_URAD, URAD_PER_RAD, Array
 
 ErrorValues = Mapping[str, Array]  # parameter key to values at the coordinates, [...], µm or µrad
@@ -71,18 +71,9 @@ def branch_pose(
 
 def nominal_point(model: Model, loop: Loop, coordinates: Coordinates) -> Array:
     """Compute the nominal tool point, or workpiece point in its loop, in R, [..., 3], mm."""
+    side, point = "tool", model.tool_point_mm
     if loop is Loop.WORKPIECE:
-        return point_in_branch(model, "workpiece", coordinates, model.workpiece_point_mm)
-    return point_in_branch(model, "tool", coordinates, model.tool_point_mm)
-
-
-def tool_axis(model: Model, coordinates: Coordinates) -> Array:
-    """Compute the nominal direction of the tool axis in R, unit vectors, [..., 3]."""
-    return transforms.rotate(branch_pose(model, "tool", coordinates)[..., :3, :3], TOOL_AXIS)
-
-
-def point_in_branch(model: Model, side: str, coordinates: Coordinates, point: Vector) -> Array:
-    """Compute the nominal position in R of a point of the tool or workpiece frame, [..., 3], mm."""
+        side, point = "workpiece", model.workpiece_point_mm
     carried = components.split(np.array(point, dtype=float))
     for _, offset, rotation in reversed(model.machine.end_frames(side)):
         carried = components.move(transforms.placed(offset, rotation), carried)
@@ -90,6 +81,11 @@ def point_in_branch(model: Model, side: str, coordinates: Coordinates, point: Ve
     out = np.empty((*np.broadcast_shapes(*axes), 3))
     components.join(carry_inwards(model, side, coordinates, carried), out)
     return out
+
+
+def tool_axis(model: Model, coordinates: Coordinates) -> Array:
+    """Compute the nominal direction of the tool axis in R, unit vectors, [..., 3]."""
+    return transforms.rotate(branch_pose(model, "tool", coordinates)[..., :3, :3], TOOL_AXIS)
 
 
 def carry_inwards(model: Model, side: str, coordinates: Coordinates, point_mm: Triple) -> Triple:
@@ -159,9 +155,11 @@ NO_DEVIATION = BranchMotion(components.ZERO, components.ZERO_ROWS)
 def build_links(
     model: Model, coordinates: Coordinates, values: ErrorValues, *, exact: bool
 ) -> LoopLinks:
-    make = _exact_link if exact else _first_order_link
     tool, workpiece = (
-        tuple(make(model, axis, coordinates, values) for axis in model.machine.branch(side))
+        tuple(
+            _build_link(model, axis, coordinates, values, exact=exact)
+            for axis in model.machine.branch(side)
+        )
         for side in ("tool", "workpiece")
     )
     direction = np.array(TOOL_AXIS)
@@ -170,7 +168,25 @@ def build_links(
     return LoopLinks(tool, workpiece, components.split(direction))
 
 
-def _link(nominal: Array, actual: Array, shift_um: Array, turn_urad: Array) -> Link:
+def _build_link(
+    model: Model, axis: Axis, coordinates: Coordinates, values: ErrorValues, *, exact: bool
+) -> Link:
+    place = transforms.placed(axis.offset_mm, axis.rotation_deg)
+    move = motion(axis, coordinates[axis.name])
+    actual = nominal = place @ move
+    shift_um, turn_urad = np.zeros(3), np.zeros((3, 3))
+    if not exact:
+        shift_um, rotation = _small_motion(model, AxisFrames(axis, place, nominal), values)
+        turn_urad = transforms.skew(rotation)
+    elif any(parameter(key).axis == axis.name for key in values):
+        constant = error_transform(axis.name, values, constant=True)
+        component = error_transform(axis.name, values, constant=False)
+        actual = place
+        for factor in model.convention(axis.name).factors(constant, move, component):
+            actual = actual if factor is None else actual @ factor
+        deviation = actual @ transforms.inverse(nominal) - np.eye(4)
+        shift_um = deviation[..., :3, 3] * UM_PER_MM
+        turn_urad = deviation[..., :3, :3] * URAD_PER_RAD
     return Link(
         components.split_rows(nominal[..., :3, :3]),
         components.split(nominal[..., :3, 3]),
@@ -180,41 +196,23 @@ def _link(nominal: Array, actual: Array, shift_um: Array, turn_urad: Array) -> L
     )
 
 
-def _exact_link(model: Model, axis: Axis, coordinates: Coordinates, values: ErrorValues) -> Link:
-    place = transforms.placed(axis.offset_mm, axis.rotation_deg)
-    move = motion(axis, coordinates[axis.name])
-    constant = error_transform(axis.name, values, constant=True)
-    component = error_transform(axis.name, values, constant=False)
-    nominal = place @ move
-    if constant is None and component is None:
-        return _link(nominal, nominal, np.zeros(3), np.zeros((3, 3)))
-    actual = place
-    for factor in model.convention(axis.name).factors(constant, move, component):
-        actual = actual if factor is None else actual @ factor
-    deviation = actual @ transforms.inverse(nominal) - np.eye(4)
-    return _link(
-        nominal, actual, deviation[..., :3, 3] * UM_PER_MM, deviation[..., :3, :3] * URAD_PER_RAD
-    )
-
-
-def _first_order_link(
-    model: Model, axis: Axis, coordinates: Coordinates, values: ErrorValues
-) -> Link:
-    place = transforms.placed(axis.offset_mm, axis.rotation_deg)
-    nominal = place @ motion(axis, coordinates[axis.name])
-    frames, convention = AxisFrames(axis, place, nominal), model.convention(axis.name)
-    shift, turn = np.zeros(3), np.zeros(3)
+def _small_motion(
+    model: Model, frames: AxisFrames, values: Mapping[str, Array | float]
+) -> tuple[Array, Array]:
+    """Sum the errors of an axis to first order: displacement of the origin, and rotation vector."""
+    convention = model.convention(frames.axis.name)
+    shift_um, turn_urad = np.zeros(3), np.zeros(3)
     for key, value in values.items():
         row = parameter(key)
-        if row.axis != axis.name or not np.any(value):
+        if row.axis != frames.axis.name or not np.any(value):
             continue
         pose = convention.frame(frames, row)
-        along = pose[..., :3, row.direction] * value[..., None]
+        along = pose[..., :3, row.direction] * np.asarray(value)[..., None]
         if row.is_rotation:
-            turn = turn + along
+            turn_urad = turn_urad + along
             along = np.cross(pose[..., :3, 3], along) * UM_PER_MM_URAD
-        shift = shift + along
-    return _link(nominal, nominal, shift, transforms.skew(turn))
+        shift_um = shift_um + along
+    return shift_um, turn_urad
 
 
 def solve_links(
@@ -229,7 +227,7 @@ def solve_links(
         first, last = last, first
     difference = BranchMotion(
         components.subtract(last.shift_um, first.shift_um),
-        components.subtract_rows(last.turn_urad, first.turn_urad),
+        components.triple(map(components.subtract, last.turn_urad, first.turn_urad)),
     )
     error = difference.move(point_mm)
     if exact:
@@ -291,7 +289,7 @@ def _walk(links: tuple[Link, ...]) -> BranchMotion:
             components.add(link.shift_um, components.rotate(link.actual, shift)),
             components.scale(-UM_PER_MM_URAD, lever),
         )
-        turn = components.add_rows(link.turn_urad, carried)
+        turn = components.triple(map(components.add, link.turn_urad, carried))
     return BranchMotion(shift, turn)
 
 
@@ -305,12 +303,6 @@ def _between(start: Triple, end: Triple) -> Triple:
 
 # A translation error moves a point along its direction; a rotation error about direction d at frame
 # origin p moves point P by d × (P − p). The lever P − p is the explanation of every gain.
-
-_SIDES: dict[Loop, tuple[tuple[str, float], ...]] = {
-    Loop.TOOL: (("tool", 1.0),),
-    Loop.WORKPIECE: (("workpiece", 1.0),),
-    Loop.RELATIVE: (("tool", 1.0), ("workpiece", -1.0)),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -343,16 +335,6 @@ def rotation_gain(lever_mm: ArrayLike, direction: ArrayLike) -> Array:
     return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], -1)
 
 
-def column(
-    model: Model, row: Parameter, frames: AxisFrames, point_mm: ArrayLike, sign: float = 1.0
-) -> JacobianColumn:
-    pose = model.convention(row.axis).frame(frames, row)
-    direction = pose[..., :3, row.direction]
-    lever = np.asarray(point_mm, dtype=float) - pose[..., :3, 3]
-    gain = rotation_gain(lever, direction) if row.is_rotation else direction
-    return JacobianColumn(direction, lever, sign * gain, sign)
-
-
 def columns(
     model: Model,
     loop: Loop,
@@ -361,14 +343,21 @@ def columns(
     point_mm: ArrayLike,
 ) -> dict[str, JacobianColumn]:
     """Build the Jacobian columns of parameters that act in a loop, at points, [..., 3], mm."""
+    sides = {"tool": 1.0, "workpiece": -1.0} if loop == Loop.RELATIVE else {str(loop): 1.0}
     rows = [parameter(key) for key in keys]
-    return {
-        row.key: column(model, row, frames, point_mm, sign)
-        for side, sign in _SIDES[loop]
-        for frames in branch_frames(model, side, coordinates)
-        for row in rows
-        if row.axis == frames.axis.name
-    }
+    jacobian_columns: dict[str, JacobianColumn] = {}
+    for side, sign in sides.items():
+        for frames in branch_frames(model, side, coordinates):
+            convention = model.convention(frames.axis.name)
+            for row in rows:
+                if row.axis != frames.axis.name:
+                    continue
+                pose = convention.frame(frames, row)
+                direction = pose[..., :3, row.direction]
+                lever = np.asarray(point_mm, dtype=float) - pose[..., :3, 3]
+                gain = rotation_gain(lever, direction) if row.is_rotation else direction
+                jacobian_columns[row.key] = JacobianColumn(direction, lever, sign * gain, sign)
+    return jacobian_columns
 
 
 def jacobian(
@@ -445,22 +434,15 @@ def body_motions(
     model: Model, values: Mapping[str, Array | float], coordinates: Coordinates
 ) -> dict[str, BodyMotion]:
     """Compute the pose and the small motion of all bodies: R, the axes, S, t and w."""
-    zero = np.zeros(3)
-    motions = {BASE: BodyMotion(np.eye(4), zero, zero)}
+    motions = {BASE: BodyMotion(np.eye(4), np.zeros(3), np.zeros(3))}
     for side in ("tool", "workpiece"):
-        pose, rotation, displacement = np.eye(4), zero, zero
+        pose, turn, shift = np.eye(4), np.zeros(3), np.zeros(3)
         for frames in branch_frames(model, side, coordinates):
-            pose = frames.after
-            for row in axis_parameters(frames.axis.name):
-                value = float(values.get(row.key, 0.0))
-                if value == 0.0:
-                    continue
-                col = column(model, row, frames, np.zeros(3))
-                displacement = displacement + col.position * value * MM_PER_UM
-                if row.is_rotation:
-                    rotation = rotation + col.direction * value * RAD_PER_URAD
-            motions[frames.axis.name] = BodyMotion(pose, rotation, displacement)
-        for name, offset, turned in model.machine.end_frames(side):
-            pose = pose @ transforms.placed(offset, turned)
-            motions[name] = BodyMotion(pose, rotation, displacement)
+            shift_um, turn_urad = _small_motion(model, frames, values)
+            pose, turn = frames.after, turn + turn_urad * RAD_PER_URAD
+            shift = shift + shift_um * MM_PER_UM
+            motions[frames.axis.name] = BodyMotion(pose, turn, shift)
+        for name, offset, rotation in model.machine.end_frames(side):
+            pose = pose @ transforms.placed(offset, rotation)
+            motions[name] = BodyMotion(pose, turn, shift)
     return motions

@@ -97,14 +97,6 @@ def multiply(a: Rows, b: Rows) -> Rows:
     return triple(triple(dot(row, column) for column in columns) for row in a)
 
 
-def add_rows(a: Rows, b: Rows) -> Rows:
-    return triple(map(add, a, b))
-
-
-def subtract_rows(a: Rows, b: Rows) -> Rows:
-    return triple(map(subtract, a, b))
-
-
 def transpose(rows: Rows) -> Rows:
     (a, b, c), (d, e, f), (g, h, i) = rows
     return (a, d, g), (b, e, h), (c, f, i)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.axes import Parameter, TravelDirection
+from warpspace.machine.curves.curve import Coordinates
 from warpspace.machine.definition import ORIGIN, Axis, Machine, Vector
 from warpspace.plugins import Registry
 from warpspace.units import Array
@@ -118,10 +119,6 @@ def convention_names() -> tuple[str, ...]:
     return tuple(convention.name for convention in _CONVENTIONS.members())
 
 
-Coordinates = Mapping[str, Array]
-"""Axis to positions, [...], broadcastable: mm for linear axes, degrees for rotary ones."""
-
-
 class Loop(StrEnum):
     """Structural loop of an error."""
 
@@ -157,17 +154,11 @@ class Model:
         return find_convention(dict(self.own_component_errors).get(axis, self.component_errors))
 
     @property
-    def convention_names(self) -> tuple[str, ...]:
-        """Names of the conventions of all axes, each once."""
-        return tuple(dict.fromkeys(self.convention(axis).name for axis in self.machine.axes))
-
-    @property
     def convention_value(self) -> str | dict[str, str]:
         """Convention in scene files: one name, or one for each axis."""
-        names = self.convention_names
-        if len(names) == 1:
-            return names[0]
-        return {axis: self.convention(axis).name for axis in self.machine.axes}
+        names = {axis: self.convention(axis).name for axis in self.machine.axes}
+        distinct = {*names.values()}
+        return names if len(distinct) > 1 else distinct.pop()
 
 
 def batch_shape(coordinates: Coordinates) -> tuple[int, ...]:

@@ -98,15 +98,6 @@ _THESIS_CONSTANTS = {
     "EX0C": "δx_ZC",
     "EY0C": "δy_ZC",
 }
-# Of axes along x, y, z, about x, y, z: roll about the motion, pitch about the horizontal normal.
-_LINEAR_ROTATIONS = (
-    ("roll", "pitch", "yaw"),
-    ("pitch", "roll", "yaw"),
-    ("pitch", "yaw", "roll"),
-)
-
-
-_THESIS_AXES = ("X", "Y", "Z", "B", "C")
 
 
 class ErrorKind(StrEnum):
@@ -171,56 +162,54 @@ class Parameter:
         return f"{self.key} · {self.symbol} · {self.name} [{self.unit}]"
 
 
-def _component(letter: str, axis: str) -> Parameter:
-    rotation = letter in ROTARY_LETTERS
-    about, along = direction_index(letter), direction_index(axis)
-    low = "xyz"[about]
-    if is_linear(axis):
-        if rotation:
-            name = f"{_LINEAR_ROTATIONS[along][about]} of {axis}"
-        else:
-            name = (
-                f"positioning of {axis}" if about == along else f"straightness of {axis} in {low}"
-            )
-    elif rotation:
-        name = f"angular positioning of {axis}" if about == along else f"tilt of {axis} about {low}"
-    else:
-        name = f"axial error of {axis}" if about == along else f"radial error of {axis} in {low}"
-    of_thesis = axis in _THESIS_AXES
-    source = "ISO 230-1; thesis table 4-2" if of_thesis else "ISO 230-1, 3.4 (not in the thesis)"
-    kind = ErrorKind.ROTATION if rotation else ErrorKind.TRANSLATION
-    return Parameter(f"E{letter}{axis}", f"{_GREEK[letter]}{axis}", name, axis, kind, source)
+# By kind and whether the axis is linear: names of an error along or about its axis, and across it.
+_NAMES = {
+    (ErrorKind.TRANSLATION, True): ("positioning of {axis}", "straightness of {axis} in {low}"),
+    (ErrorKind.TRANSLATION, False): ("axial error of {axis}", "radial error of {axis} in {low}"),
+    (ErrorKind.ROTATION, True): ("{turn} of {axis}", "{turn} of {axis}"),
+    (ErrorKind.ROTATION, False): ("angular positioning of {axis}", "tilt of {axis} about {low}"),
+    (ErrorKind.SQUARENESS, True): (
+        "rotation of {axis} about itself",
+        "squareness of {axis} to {third}",
+    ),
+    (ErrorKind.ORIENTATION, False): ("orientation of {axis} about {low}",) * 2,
+}
+# Of axes along x, y, z, about x, y, z: roll about the motion, pitch about the horizontal normal.
+_LINEAR_ROTATIONS = (
+    ("roll", "pitch", "yaw"),
+    ("pitch", "roll", "yaw"),
+    ("pitch", "yaw", "roll"),
+)
 
 
-def _constant(letter: str, axis: str) -> Parameter:
-    key = f"E{letter}0{axis}"
+def _parameter(letter: str, axis: str, *, constant: bool) -> Parameter:
+    key = f"E{letter}{'0' * constant}{axis}"
     about, along = direction_index(letter), direction_index(axis)
-    low = "xyz"[about]
-    if letter not in ROTARY_LETTERS:
-        kind = ErrorKind.LOCATION
-        name = f"location of {axis} in {low}"
-    elif not is_linear(axis):
-        kind = ErrorKind.ORIENTATION
-        name = f"orientation of {axis} about {low}"
-    else:
-        kind = ErrorKind.SQUARENESS
-        if about == along:
-            name = f"rotation of {axis} about itself"
-        else:
-            name = f"squareness of {axis} to {'XYZ'[3 - about - along]}"
-    symbol = _THESIS_CONSTANTS.get(key, f"{_CONSTANT_GREEK[letter]}_0{axis}")
-    if kind is ErrorKind.LOCATION and key in _THESIS_CONSTANTS:
+    kinds = (ErrorKind.TRANSLATION, ErrorKind.ROTATION)
+    if constant:
+        angle = ErrorKind.SQUARENESS if is_linear(axis) else ErrorKind.ORIENTATION
+        kinds = (ErrorKind.LOCATION, angle)
+    kind = kinds[letter in ROTARY_LETTERS]
+    names = _NAMES.get((kind, is_linear(axis)), ("location of {axis} in {low}",) * 2)
+    turn, third = _LINEAR_ROTATIONS[along][about], "XYZ"[(3 - about - along) % 3]
+    name = names[about != along].format(axis=axis, low="xyz"[about], turn=turn, third=third)
+    symbol = f"{_CONSTANT_GREEK[letter]}_0{axis}" if constant else f"{_GREEK[letter]}{axis}"
+    if key not in _THESIS_CONSTANTS if constant else axis not in "XYZBC":
+        source = f"ISO 230-1, 3.{5 if constant else 4} (not in the thesis)"
+    elif kind is ErrorKind.LOCATION:
         source = "ISO 230-1; thesis equations (left out of its table 4-2)"
-    elif key in _THESIS_CONSTANTS:
-        source = "ISO 230-1; thesis table 4-2"
     else:
-        source = "ISO 230-1, 3.5 (not in the thesis)"
-    return Parameter(key, symbol, name, axis, kind, source)
+        source = "ISO 230-1; thesis table 4-2"
+    return Parameter(key, _THESIS_CONSTANTS.get(key, symbol), name, axis, kind, source)
 
 
 @cache
 def axis_parameters(axis: str) -> tuple[Parameter, ...]:
-    return tuple(build(letter, axis) for build in (_component, _constant) for letter in DIRECTIONS)
+    return tuple(
+        _parameter(letter, axis, constant=constant)
+        for constant in (False, True)
+        for letter in DIRECTIONS
+    )
 
 
 PARAMETERS = {row.key: row for axis in AXIS_NAMES for row in axis_parameters(axis)}

@@ -73,7 +73,6 @@ def parse_chain(text: str) -> Chain:
 
 
 ACROSS = "xyz"  # directions in which the guides of a gantry may lie apart
-_DEFAULT_ACROSS = {"x": "y", "y": "x", "z": "x"}
 URAD_PER_UM_OVER_MM = 1000.0  # A micrometre over a millimetre is a milliradian
 
 
@@ -113,7 +112,7 @@ class Gantry:
 
 def default_across(axis: str) -> str:
     """Return the default direction across: the other horizontal one; x for Z."""
-    return _DEFAULT_ACROSS["xyz"[direction_index(axis)]]
+    return "x" if direction_index(axis) else "y"
 
 
 Vector = tuple[float, float, float]

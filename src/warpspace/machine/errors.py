@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpspace.machine.axes import TravelDirection, parameter
-from warpspace.machine.curves.curve import OWN_AXIS, ErrorFunction
+from warpspace.machine.curves.curve import OWN_AXIS, Coordinates, ErrorFunction
 from warpspace.machine.curves.simple import NOTHING, Constant, Directional, Harmonics, Poly, Ramp
 from warpspace.machine.curves.table import TableCurve, TwoArguments
 from warpspace.machine.limits import MIN_SPAN
@@ -59,19 +59,13 @@ class ErrorSet:
         return self._function(key).evaluate(position)
 
     def evaluate_at(
-        self,
-        key: str,
-        coordinates: Mapping[str, Array],
-        direction: str = TravelDirection.MEAN,
+        self, key: str, coordinates: Coordinates, direction: str = TravelDirection.MEAN
     ) -> Array:
         """Evaluate one error at positions of its arguments, reached in a direction, [...]."""
         return self._function(key).evaluate_at(parameter(key).axis, coordinates, direction)
 
     def shape_at(
-        self,
-        key: str,
-        coordinates: Mapping[str, Array],
-        direction: str = TravelDirection.MEAN,
+        self, key: str, coordinates: Coordinates, direction: str = TravelDirection.MEAN
     ) -> Array:
         """Evaluate one error for an amplitude of one; an absent error is a constant.
 

@@ -232,15 +232,8 @@ def _write_images(
     else:
         frames = pictures
         options = {"quality": 85, "method": 4}
-    frames[0].save(
-        path,
-        format=ending[1:],
-        save_all=True,
-        append_images=frames[1:],
-        duration=duration,
-        loop=0,
-        **options,
-    )
+    options |= {"save_all": True, "append_images": frames[1:], "duration": duration, "loop": 0}
+    frames[0].save(path, format=ending[1:], **options)
 
 
 def shared_palette(pictures: Sequence[Image.Image]) -> Image.Image:
@@ -273,12 +266,8 @@ def _write_video(
     encoding = ["-an", "-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p"]
     encoding += ["-movflags", "+faststart", "-metadata", f"comment={about}"]
     encoding += ["-fflags", "+bitexact", "-flags:v", "+bitexact", "-f", "mp4"]
-    process = subprocess.run(
-        [encoder, "-y", "-loglevel", "error", *source, *encoding, str(path)],
-        input=raw,
-        capture_output=True,
-        check=False,
-    )
+    command = [encoder, "-y", "-loglevel", "error", *source, *encoding, str(path)]
+    process = subprocess.run(command, input=raw, capture_output=True, check=False)
     if process.returncode != 0:
         lines = process.stderr.decode(errors="replace").strip().splitlines()
         reason = lines[-1] if lines else f"the encoder ended with {process.returncode}"

@@ -1,4 +1,4 @@
-"""Figures and charts to bytes and files; the same figure gives the same bytes."""
+"""Figures, charts and drawings of a page as bytes and files, the same for the same content."""
 
 import gc
 import io
@@ -10,33 +10,39 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from warpspace.outputs.drawing.settings import FIGURE_ENDINGS, SAVE_RC, FigureSettings
-from warpspace.outputs.drawing.sheet import Drawing
+from warpspace.geometry.colour import ColourScale
+from warpspace.outputs.drawing.canvas import LEADER_FROM, Canvas, Occupancy, write_label
+from warpspace.outputs.drawing.settings import (
+    DARK,
+    FIGURE_ENDINGS,
+    LIGHT,
+    SAVE_RC,
+    FigureSettings,
+    factor,
+)
+from warpspace.outputs.drawing.sheet import Drawing, Row, Sheet, draw_heading
 from warpspace.outputs.figures.registry import draw_figure
-from warpspace.outputs.file_output import check_target, write_atomically
+from warpspace.outputs.file_output import check_target, write_content
+from warpspace.resources import __version__
 from warpspace.scene.model import Scene
+from warpspace.units import Array
 
 
 def figure_bytes(drawing: Drawing, form: str) -> bytes:
     facts = drawing.facts
     about = f"{facts['settings']}; scene={facts['scene']}"
-    tags = {"Title": drawing.title}
-    if form == "png":
-        tags |= {
-            "Software": facts["version"],
-            "Description": about,
-            "Exaggeration": facts["exaggeration"],
-            "Scene": facts["scene"],
-        }
-    elif form == "svg":
-        tags |= {"Creator": facts["version"], "Description": about}
-    else:
-        keywords = f"scene={facts['scene']}, exaggeration={facts['exaggeration']}"
-        tags |= {"Creator": facts["version"], "Subject": about, "Keywords": keywords}
-    return encode_figure(drawing.figure, form, tags)
+    numbers = {name.title(): facts[name] for name in ("exaggeration", "scene")}
+    keywords = f"scene={facts['scene']}, exaggeration={facts['exaggeration']}"
+    tags = {
+        "png": {"Software": facts["version"], "Description": about, **numbers},
+        "svg": {"Creator": facts["version"], "Description": about},
+        "pdf": {"Creator": facts["version"], "Subject": about, "Keywords": keywords},
+    }[form]
+    return encode_figure(drawing.figure, form, {"Title": drawing.title, **tags})
 
 
 def render_figure(
@@ -58,8 +64,7 @@ def write_figure(
 ) -> Path:
     form = check_target(path, FIGURE_ENDINGS, overwrite=force).suffix.lower().lstrip(".")
     content = render_figure(name, scenes, settings or FigureSettings(), form)
-    with write_atomically(path, overwrite=force) as temporary:
-        temporary.write_bytes(content)
+    write_content(content, path, overwrite=force)
     return Path(path)
 
 
@@ -67,8 +72,7 @@ def write_chart(figure: Figure, path: str | Path, *, overwrite: bool = True) -> 
     """Write a chart; the ending chooses the format, the same chart gives the same bytes."""
     target = check_target(path, FIGURE_ENDINGS, overwrite=overwrite)
     content = encode_figure(figure, target.suffix.lower().lstrip("."))
-    with write_atomically(target, overwrite=overwrite) as temporary:
-        temporary.write_bytes(content)
+    write_content(content, target, overwrite=overwrite)
     return target
 
 
@@ -99,3 +103,42 @@ def encode_figure(figure: Figure, form: str, facts: Mapping[str, str] | None = N
                 facecolor=figure.get_facecolor(),
             )  # fmt: skip
     return buffer.getvalue()
+
+
+HEAD, PANEL = 190.0, 330.0  # space above and beside the pixels, px of a 1600 × 1200 figure
+
+
+def draw_view(
+    pixels: NDArray[np.uint8],  # [height, width, 3 or 4]
+    title: str,
+    facts: Sequence[str],
+    scale: ColourScale,
+    marks: Mapping[str, float],
+    rows: Sequence[Row],
+    bars: tuple[float, float] | None,  # px of a millimetre, display factor; None for no scale bars
+    labels: Sequence[tuple[str, Array]],  # text and point, [2], px from the left bottom
+    dark: bool,
+) -> bytes:
+    """Draw the pixels of a page as a PNG with heading, colour bar, scale bars and labels."""
+    height, width = pixels.shape[:2]
+    unit = factor(width, height)
+    canvas = Canvas(
+        width + round(PANEL * unit), height + round(HEAD * unit), DARK if dark else LIGHT
+    )
+    drawn = (0.0, 0.0, float(width), float(height))
+    canvas.image(pixels, drawn)
+    draw_heading(canvas, title, facts)
+    column = (width + 0.3 * canvas.margin, 0.6 * canvas.margin, canvas.width - 0.6 * canvas.margin,
+              float(height))  # fmt: skip
+    sheet = Sheet("view", canvas, title, drawn, column, (), FigureSettings(dark=dark))
+    sheet.draw_panel(scale, f"{scale.label} [{scale.unit}]", list(marks.items()), rows, bars)
+    occupancy = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
+    if pixels.shape[2] == 4:
+        occupancy.add_mask(pixels[..., 3] > 127, drawn)
+    for text, point_px in labels:
+        placed = write_label(canvas, text, [point_px], drawn, occupancy)
+        if placed is not None and placed.distance > canvas.px(LEADER_FROM):
+            placed.draw_leader(canvas, canvas.theme.ink)
+    program, description = f"warpspace {__version__}", "; ".join(facts)
+    tags = {"Title": title, "Software": program, "Description": description}
+    return encode_figure(canvas.figure, "png", tags)

@@ -68,6 +68,11 @@ def write_atomically(
         yield temporary
 
 
+def write_content(content: bytes, path: str | Path, *, overwrite: bool = True) -> None:
+    with write_atomically(path, overwrite=overwrite) as temporary:
+        temporary.write_bytes(content)
+
+
 @contextmanager
 def write_together(
     paths: Iterable[str | Path], *, overwrite: bool = True, original: bytes | None = None

@@ -20,13 +20,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
-from warpspace.exceptions import (
-    OptionError,
-    RenderError,
-    SceneError,
-    UnknownNameError,
-    WorkersLostError,
-)
+from warpspace import exceptions
 from warpspace.resources import check_address_space
 
 if TYPE_CHECKING:
@@ -48,11 +42,9 @@ class ProcessPool(Executor):
         self, processes: int, *, tasks_per_process: int | None = None, losses: int = 0
     ) -> None:
         if _ending.is_set():
-            raise RenderError("the program is ending: no process is started")
-        self.ended = False
-        self._tasks_per_process = tasks_per_process
-        self._may_lose = losses
-        self._lost = 0
+            raise exceptions.RenderError("the program is ending: no process is started")
+        self._tasks_per_process, self._may_lose = tasks_per_process, losses
+        self.ended, self._lost = False, 0
         self._lock = threading.Lock()
         self._workers: set[_Worker] = set()
         self._idle: list[_Worker] = []
@@ -114,9 +106,9 @@ class ProcessPool(Executor):
                     worker.process.kill()
                 return worker
         if self.ended:
-            raise WorkersLostError("the worker processes were ended")
+            raise exceptions.WorkersLostError("the worker processes were ended")
         times = "once" if self._lost == 1 else f"{self._lost} times"
-        raise WorkersLostError(f"worker processes died {times} (out of memory?)")
+        raise exceptions.WorkersLostError(f"worker processes died {times} (out of memory?)")
 
     def _retire(self, worker: "_Worker") -> None:
         with self._lock:
@@ -242,9 +234,9 @@ def _draw(name: str, scenes: "Sequence[Scene]", settings: "FigureSettings", form
     gc.freeze()  # permanent objects are not searched for garbage before every figure
     try:
         return render_figure(name, scenes, settings, form)
-    except (SceneError, UnknownNameError) as error:
+    except (exceptions.SceneError, exceptions.UnknownNameError) as error:
         # these two cannot be pickled
-        raise OptionError(str(error)) from None
+        raise exceptions.OptionError(str(error)) from None
 
 
 def _draw_chart(draw: str, form: str, *arguments: Any) -> bytes:
@@ -287,17 +279,19 @@ class FigureWorker:
     def _wait(self, name: str, pool: ProcessPool, future: "Future[bytes]") -> bytes:
         try:
             return future.result(self._timeout_s)
-        except (WorkersLostError, CancelledError):
+        except (exceptions.WorkersLostError, CancelledError):
             if pool.ended:
-                raise RenderError(f"figure {name!r} was stopped: its renderer was ended") from None
+                raise exceptions.RenderError(
+                    f"figure {name!r} was stopped: its renderer was ended"
+                ) from None
             self._abandon(pool)
-            raise RenderError(
+            raise exceptions.RenderError(
                 f"figure {name!r} could not be drawn: the renderer crashed; other figures are not"
                 " affected"
             ) from None
         except TimeoutError:
             self._abandon(pool)
-            raise RenderError(
+            raise exceptions.RenderError(
                 f"figure {name!r} was stopped after {self._timeout_s:g} s; expected a smaller one"
             ) from None
 
@@ -310,11 +304,9 @@ class FigureWorker:
     def close(self, *, wait: bool = True) -> None:
         with self._lock:
             pool, self._pool = self._pool, None
-        if pool is None:
-            return
-        if wait:
+        if pool is not None and wait:
             pool.shutdown(cancel_futures=True)
-        else:
+        elif pool is not None:
             pool.kill()
 
     def __enter__(self) -> "FigureWorker":

@@ -15,11 +15,7 @@ import numpy as np
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
 from warpspace.analysis.description import ExpandedUncertainty, ProgressCallback, Result
 from warpspace.analysis.options import option
-from warpspace.analysis.uncertainty.propagation import (
-    FieldUncertainty,
-    plus_minus,
-    scene_uncertainty,
-)
+from warpspace.analysis.uncertainty.propagation import FieldUncertainty, plus_minus
 from warpspace.bench.placing import following_axes
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
@@ -120,12 +116,10 @@ class Clamp(WorkpieceAnalysis):
             title=f"{scene.title} · {mesh.name}", placed=self.placed, warnings=mesh.warnings,
             second_order=second_order(scene, Loop.RELATIVE),
         )  # fmt: skip
-        is_large = len(mesh.triangles) > MAX_FEATURE_TRIANGLES
-        if is_large or not scene_uncertainty(scene, Loop.RELATIVE):
+        if len(mesh.triangles) > MAX_FEATURE_TRIANGLES:
             return result
-        return result.with_expanded_uncertainty(
-            *(_uncertainties(scene, mesh, clamping.place) for clamping in (now, first))
-        )
+        each = [_uncertainties(scene, mesh, clamping.place) for clamping in (now, first)]
+        return result.with_expanded_uncertainty(*each) if all(each) else result
 
 
 def _evaluate(scene: Scene, part: Workpiece) -> Clamping:

@@ -186,19 +186,15 @@ def _fit_feature(mesh: Workpiece, kind: str, rows: NDArray[np.intp]) -> Feature 
     centre = centre - reach * (mean - (mean @ axis) * axis)
     start = FeatureShape(kind, centre, axis, abs(reach) * np.cos(angle), angle)
     turned = np.sum(start.respond(place)[1] * normal, axis=1)
-    if (
-        area @ (turned * np.sign(area @ turned) < np.cos(np.deg2rad(NEAR_DEG)))
-        > SLIVER_SHARE * area.sum()
-    ):
+    is_turned = turned * np.sign(area @ turned) < np.cos(np.deg2rad(NEAR_DEG))
+    if area @ is_turned > SLIVER_SHARE * area.sum():
         return None
     vertices = np.unique(mesh.triangles[rows])
     points = mesh.vertices_mm[vertices]
     shape = fit_shape(start, points)
     distance, *response = shape.respond(points)
-    tolerance = (
-        SHAPE_SHARE * np.linalg.norm(np.ptp(points, axis=0))
-        + ROUNDING_SHARE * np.abs(mesh.vertices_mm).max()
-    )
+    tolerance = SHAPE_SHARE * np.linalg.norm(np.ptp(points, axis=0))
+    tolerance += ROUNDING_SHARE * np.abs(mesh.vertices_mm).max()
     is_close = np.abs(distance).max() <= tolerance
     return Feature(shape, vertices, float(area.sum()), *response) if is_close else None
 

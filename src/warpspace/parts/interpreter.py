@@ -55,11 +55,7 @@ FULL_TURN_RAD = 1e-9  # an arc below it is a full circle
 STAND, RAPID, FEED, ARC = range(4)  # kinds of moves; STAND: the same place in another mode
 PLANES, CENTRES = ("YZ", "ZX", "XY"), ("JK", "KI", "IJ")  # of arcs, by the direction across
 CYCLES = "G81", "G82", "G83"
-_UNUSED_LETTERS = {
-    "G2": "L",
-    "G3": "L",
-    **dict.fromkeys(CYCLES, "IJ"),
-}  # letters without meaning there
+_UNUSED_LETTERS = {"G2": "L", "G3": "L", **dict.fromkeys(CYCLES, "IJ")}  # without meaning there
 MAX_REMARKS = 1000  # words listed as not understood
 MAX_SHOWN = MAX_TYPED_NUMBER  # characters of a word that a message shows
 WORD = re.compile(
@@ -240,7 +236,7 @@ class Interpreter:
         """Execute lines and return them one by one, up to the first refused word."""
         for line, raw in enumerate(lines, start=1):
             self.line, self.codes, self.words, self.tokens = line, [], {}, []
-            self.skip, text = "", raw.strip()
+            self.skip, self.once, text = "", "", raw.strip()
             if line > MAX_LINES or len(raw) > MAX_LINE or len(self.unknown) > MAX_REMARKS:
                 size = f"{MAX_LINES:,} lines of {MAX_LINE:,} characters, {MAX_REMARKS:,}"
                 self.fail(f"is no program in G-code; expected at most {size} other words")
@@ -300,7 +296,6 @@ class Interpreter:
 
     def execute_block(self) -> None:
         """Execute the codes of the current block, then its motion."""
-        self.set_once("")
         for code in self.codes:
             handler = CODES.get(code)
             if handler is not None:
@@ -315,13 +310,12 @@ class Interpreter:
         for letter in self.words.keys() & {*unused}:
             self.unknown.setdefault(f"{letter} with {self.once or self.motion}", self.line)
         is_arc = self.motion in {"G2", "G3"} and self.words.keys() & {*"IJKR"}
-        if self.once == "G28" or (self.once == "G53" and self.letters):
-            MOTIONS[self.once](self)
+        if self.once == "G28":
+            self.move_home()
+        elif self.once == "G53" and self.letters:  # to axis positions
+            self.line_to({self.index[x]: self.value(x) for x in self.letters}, bare=True)
         elif self.letters or is_arc:
             MOTIONS[self.motion](self)
-
-    def set_once(self, code: str) -> None:
-        self.once = code
 
     def move_home(self) -> None:
         """Move over the programmed point to axis positions zero, or the nearest end of travel."""
@@ -333,13 +327,6 @@ class Interpreter:
             index = self.index[letter]
             home[index] = float(np.clip(0.0, *axes[self.names[index]].travel))
         self.line_to(home, RAPID, bare=True)
-
-    def move_bare(self) -> None:
-        """Move to axis positions (G53)."""
-        self.line_to({self.index[x]: self.value(x) for x in self.letters}, bare=True)
-
-    def move_straight(self) -> None:
-        self.line_to(self.target())
 
     def compensate(self, code: str) -> None:
         """Set the length compensation of the tool, and TCP."""
@@ -393,10 +380,8 @@ class Interpreter:
         """Move to positions of some axes: bare ones, or places of the tip with TCP."""
         tcp = self.tcp
         self.switch(tcp=tcp and not bare, length_mm=self.length_mm)
-        before, self.position = (
-            self.position,
-            [to.get(index, at) for index, at in enumerate(self.position)],
-        )
+        before = self.position
+        self.position = [to.get(index, at) for index, at in enumerate(before)]
         kind = kind or (RAPID if self.motion == "G0" else FEED)
         if not self.first or self.unnamed_axes & to.keys():
             self.unnamed_axes -= to.keys()
@@ -491,14 +476,13 @@ CODES: Mapping[str, CodeHandler] = {
     "G98": _modal("to_initial", value=True), "G99": _modal("to_initial", value=False),
     **{code: _modal("system", code) for code in ("G54", "G55", "G56", "G57", "G58", "G59")},
     **dict.fromkeys(("G43", "G43.4", "G49"), Interpreter.compensate),
-    **dict.fromkeys(("G4", "G28", "G53"), Interpreter.set_once),
+    **{code: _modal("once", code) for code in ("G4", "G28", "G53")},
     **dict.fromkeys(_NO_EFFECT, lambda _control, _code: None),
 }  # fmt: skip
 """Effects of the supported codes."""
 MOTIONS: Mapping[str, Callable[[Interpreter], None]] = {
-    **dict.fromkeys(("G0", "G1"), Interpreter.move_straight),
+    **dict.fromkeys(("G0", "G1"), lambda control: control.line_to(control.target())),
     **dict.fromkeys(("G2", "G3"), Interpreter.move_along_arc),
     **dict.fromkeys(CYCLES, Interpreter.drill),
-    "G28": Interpreter.move_home, "G53": Interpreter.move_bare,
-}  # fmt: skip
-"""Motions of a block by its modal or non-modal code."""
+}
+"""Motions of a block by its modal code."""

@@ -95,11 +95,11 @@ class ToolPath:
         bend = np.where(follows, step - np.roll(step, 1, axis=0), 0.0)
         tangent = 2.0 * step + np.where(np.roll(follows, -1, axis=0), next_step - step, bend)
         tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12)
-        for project in (
-            np.asarray,
-            lambda um: _along(um, tangent),
-            lambda um: um - _along(um, tangent),
-        ):
+
+        def along(error_um: Array) -> Array:
+            return np.sum(error_um * tangent, axis=-1, keepdims=True) * tangent
+
+        for project in (np.asarray, along, lambda um: um - along(um)):
             um = np.linalg.norm(project(self.error_um), axis=1)
             mean, square = np.average([um, um**2], axis=1, weights=self.shares).tolist()
             p95 = float(np.quantile(um, P95, weights=self.shares, method="inverted_cdf"))
@@ -120,10 +120,6 @@ class ToolPath:
         if not lengths.any():
             return np.full(len(lengths), 1.0 / len(lengths))
         return lengths / lengths.sum()
-
-
-def _along(error_um: Array, tangent: Array) -> Array:
-    return np.sum(error_um * tangent, axis=-1, keepdims=True) * tangent
 
 
 def trace_program(program: ParsedProgram, chord_mm: float = CHORD_MM) -> ToolPath:
@@ -229,9 +225,8 @@ class PathPoint:
     axes: Mapping[str, float]  # mm or degrees
     error_um: Array  # [3]
     budget: Mapping[str, float]  # contributions to |E| by parameter, µm, largest first
-    expanded_uncertainty: ExpandedUncertainty[
-        float | None
-    ]  # u95_um of |E|; empty if none is stated
+    # u95_um of |E|; empty if none is stated
+    expanded_uncertainty: ExpandedUncertainty[float | None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -284,14 +279,9 @@ class Program(interpreter.ControlSettings, Analysis):
             u95 = ExpandedUncertainty[float | None]()
             if path.uncertainty:
                 u95["u95_um"] = path.uncertainty.u95_at(sample)
-            return PathPoint(
-                int(path.line[sample]),
-                float(path.norm_um[sample]),
-                axes,
-                path.error_um[sample],
-                {part.key: part.along_um for part in ranked},
-                u95,
-            )
+            line, um = int(path.line[sample]), float(path.norm_um[sample])
+            budget = {part.key: part.along_um for part in ranked}
+            return PathPoint(line, um, axes, path.error_um[sample], budget, u95)
 
         ends = np.flatnonzero(path.line == self.at_line)
         if self.at_line and not len(ends):

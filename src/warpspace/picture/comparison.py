@@ -10,15 +10,8 @@ from warpspace.analysis.description import to_json
 from warpspace.analysis.statistics import Statistics
 from warpspace.exceptions import OptionError
 from warpspace.machine.errors import ErrorSet
+from warpspace.picture import model
 from warpspace.picture.formatting import point_axes, spell_at, spell_point
-from warpspace.picture.model import (
-    DIFFERENCE_LENGTH,
-    Exaggeration,
-    ScenePicture,
-    choose_exaggeration,
-    same_nodes,
-    subtract_traces,
-)
 from warpspace.picture.traces import TraceLines
 from warpspace.scene.model import Scene
 
@@ -28,16 +21,16 @@ STATISTICS = {"mean": "mean_um", "RMS": "rms_um", "P95": "p95_um", "max": "max_u
 
 
 @dataclass(frozen=True, kw_only=True)
-class DifferencePicture(ScenePicture):
+class DifferencePicture(model.ScenePicture):
     """The change from scene A to scene B, B − A; the bodies of its machine stand nominally."""
 
-    a: ScenePicture
-    b: ScenePicture
+    a: model.ScenePicture
+    b: model.ScenePicture
 
     @cached_property
     def traces(self) -> tuple[TraceLines, ...]:
         """Traces that both have, each displaced by the difference."""
-        return subtract_traces(self.b.traces, self.a.traces)
+        return model.subtract_traces(self.b.traces, self.a.traces)
 
     @cached_property
     def settings(self) -> dict[str, Any]:
@@ -65,7 +58,7 @@ class DifferencePicture(ScenePicture):
             "title": self.scene.title,
             "settings": self.settings,
             "statistics": to_json(self.statistics),
-            "statistics_of": DIFFERENCE_LENGTH,
+            "statistics_of": model.DIFFERENCE_LENGTH,
             "change": statistics_change(self.a.statistics, self.b.statistics),
             "a": self.a.provenance,
             "b": self.b.provenance,
@@ -87,7 +80,7 @@ def statistics_blocks(
     if change:
         columns.append(Column(CHANGE, "+.2f", "µm", joins=True))
     if len(fields) > len(names):
-        columns.append(Column(DIFFERENCE_LENGTH, ".2f", "µm", joins=True))
+        columns.append(Column(model.DIFFERENCE_LENGTH, ".2f", "µm", joins=True))
     rows = [
         (
             name, *(getattr(summary, key) for summary in fields[: len(names)]),
@@ -97,7 +90,7 @@ def statistics_blocks(
         for name, key in STATISTICS.items()
     ]  # fmt: skip
     yield Table(tuple(columns), rows)
-    for name, part in zip((*names, DIFFERENCE_LENGTH), fields, strict=False):
+    for name, part in zip((*names, model.DIFFERENCE_LENGTH), fields, strict=False):
         if part.max_um > 0.0:
             worst = point_axes(scene, part.max_at_axes)
             yield f"  max of {name} at {spell_point(worst, part.max_at_mm)} mm"
@@ -111,9 +104,9 @@ def conditions_of_both(a: Sequence[str], b: Sequence[str]) -> tuple[str, ...]:
     return (*only_a, *only_b, *(condition for condition in a if condition in b))
 
 
-def scene_change(a: ScenePicture, b: ScenePicture) -> DifferencePicture:
+def scene_change(a: model.ScenePicture, b: model.ScenePicture) -> DifferencePicture:
     """Subtract the errors of evaluated scene A from those of B, B − A."""
-    if not same_nodes(a.field.nominal_mm, b.field.nominal_mm):
+    if not model.same_nodes(a.field.nominal_mm, b.field.nominal_mm):
         raise OptionError(
             f"{a.scene.name} and {b.scene.name} cannot be compared: their working volumes"
             " differ ([workspace] of both must give the same box)"
@@ -140,10 +133,10 @@ def scene_change(a: ScenePicture, b: ScenePicture) -> DifferencePicture:
 
 
 def share_exaggeration(
-    pictures: Sequence[ScenePicture], exaggeration: Exaggeration
-) -> tuple[ScenePicture, ...]:
+    pictures: Sequence[model.ScenePicture], exaggeration: model.Exaggeration
+) -> tuple[model.ScenePicture, ...]:
     """Apply one display factor to pictures: as requested, the first scene's, or a round one."""
-    factor = choose_exaggeration(
+    factor = model.choose_exaggeration(
         exaggeration,
         pictures[0].scene.exaggeration,
         max(picture.statistics.max_um for picture in pictures),

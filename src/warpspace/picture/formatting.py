@@ -58,12 +58,11 @@ def spell_point(axes: Mapping[str, SupportsFloat], point_mm: Array | Sequence[fl
 
 def spell_at(axes: Mapping[str, SupportsFloat]) -> str:
     """Spell positions of axes as the option ``--at`` of a command takes them."""
-    names = sorted(axes, key=is_rotary)
-    return ",".join(f"{name}={_plain(float(axes[name]))}" for name in names)
-
-
-def _plain(value: float) -> str:
-    return f"{round(value, _DIGITS) + 0.0:.{_DIGITS}f}".rstrip("0").rstrip(".")
+    positions = {
+        name: round(float(axes[name]), _DIGITS) + 0.0 for name in sorted(axes, key=is_rotary)
+    }
+    plain = {name: f"{at:.{_DIGITS}f}".rstrip("0").rstrip(".") for name, at in positions.items()}
+    return ",".join(f"{name}={text}" for name, text in plain.items())
 
 
 def u95_behind(u95: float | None) -> str:
@@ -146,10 +145,8 @@ def convention_groups(model: Model) -> tuple[tuple[Convention, tuple[str, ...]],
 
 def convention_words(scene: Scene) -> str:
     groups = convention_groups(scene.model)
-    if len(groups) == 1:
-        return f"component errors {groups[0][0].place}"
     parts = [f"{convention.place} of {' '.join(axes)}" for convention, axes in groups]
-    return f"component errors {', '.join(parts)}"
+    return f"component errors {groups[0][0].place if len(groups) == 1 else ', '.join(parts)}"
 
 
 def direction_words(scene: Scene) -> tuple[str, ...]:

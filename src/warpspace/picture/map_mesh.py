@@ -109,8 +109,6 @@ def _collect(patches: list[tuple[MapPatch, Index, Index]]) -> MapMesh:
     values = [part.values.reshape(-1).take(used) for part, used, _ in patches]
     faded = [part.faded.reshape(-1)[at] for part, at, _ in patches if part.faded is not None]
     fading = np.concatenate(faded) if faded else None  # all patches have it, or none
-    if len(patches) == 1:
-        return MapMesh(vertices[0], patches[0][2], values[0], fading)
     first = np.cumsum([0, *map(len, vertices)])
     cells = [cells + at for (_, _, cells), at in zip(patches, first, strict=False)]
     return MapMesh(np.concatenate(vertices), np.concatenate(cells), np.concatenate(values), fading)
@@ -126,12 +124,12 @@ def grid_pieces(picture: Picture) -> Pieces:
 
 def edge_pieces(picture: Picture) -> Pieces:
     """Collect the edges of a map, [S, 2, 3], mm."""
-    return _joined(
-        [
-            part.pieces(part.drawn_of.edge_segments, part.drawn_of.edge_outwards, EDGE_LIFT)[0]
-            for part in map_parts(picture)
+    lines: list[Pieces] = []
+    for part in map_parts(picture):
+        lines += part.pieces(part.drawn_of.edge_segments, part.drawn_of.edge_outwards, EDGE_LIFT)[
+            :1
         ]
-    )
+    return _joined(lines)
 
 
 def isoline_pieces(picture: Picture) -> Pieces:

@@ -67,28 +67,16 @@ def topology(shape: surfaces.Shape, *, cut: bool = False) -> Topology:
     outwards = np.zeros((int(np.prod(shape)), 3))
     for face, normal in zip(faces, normals, strict=True):
         outwards[face] += normal
-    outwards = np.sign(outwards)  # patches of one plane share nodes
+    outwards = np.sign(outwards).astype(np.float32)  # patches of one plane share nodes
     lines = surfaces.face_lines(faces, shape, surfaces.line_spacing(shape))
     grid, edges = surfaces.segments(lines), surfaces.segments(surfaces.crease_lines(faces, shape))
-    return Topology(
-        surfaces.triangulate(faces),
-        grid,
-        edges,
-        outwards[grid].astype(np.float32),
-        outwards[edges].astype(np.float32),
-        tuple(faces),
-        normals,
-    )
+    surface = surfaces.triangulate(faces)
+    return Topology(surface, grid, edges, outwards[grid], outwards[edges], tuple(faces), normals)
 
 
 def _normal(face: surfaces.Index, shape: surfaces.Shape) -> Array:
-    corner, down, right = (
-        np.array(np.unravel_index(index, shape), dtype=float)
-        for index in (face[0, 0], face[-1, 0], face[0, -1])
-    )
-    normal = np.zeros(3)
-    normal[surfaces.face_axis(face, shape)] = 1.0
-    return normal * np.sign(np.cross(down - corner, right - corner) @ normal)
+    corners = np.stack(np.unravel_index(face[[0, -1, 0], [0, 0, -1]], shape), -1)
+    return np.sign(np.cross(corners[1] - corners[0], corners[2] - corners[0])).astype(float)
 
 
 QUANTITIES = {
@@ -283,13 +271,8 @@ VIEW_WORDS = {
 
 def view_words(view: str, shape: surfaces.Shape) -> str:
     """Describe the direction of view and the part of the volume that is cut away."""
-    if view == "iso":
-        return (
-            "octant towards the viewer cut away"
-            if min(shape) >= surfaces.MIN_CUT_NODES
-            else "iso view"
-        )
-    return VIEW_WORDS[view]
+    is_cut = view == "iso" and min(shape) >= surfaces.MIN_CUT_NODES
+    return "octant towards the viewer cut away" if is_cut else VIEW_WORDS.get(view, "iso view")
 
 
 Exaggeration = float | Literal["auto"] | None
@@ -364,9 +347,7 @@ class ScenePicture(Picture):
     @property
     def remarks(self) -> dict[str, str]:
         """Columns that are the same in all rows of a table: scene, loop, reference, convention."""
-        columns = field_remarks(self.scene, self.view)
-        program = columns.pop("program")
-        return {**columns, "conditions": "; ".join(self.conditions), "program": program}
+        return field_remarks(self.scene, self.view, conditions="; ".join(self.conditions))
 
     @cached_property
     def provenance(self) -> dict[str, Any]:
@@ -389,26 +370,24 @@ class ScenePicture(Picture):
         }
 
 
-def field_remarks(scene: Scene, view: View, *, exact: bool = False) -> dict[str, str]:
-    reference = view.reference
+def field_remarks(
+    scene: Scene, view: View, *, exact: bool = False, **others: str
+) -> dict[str, str]:
+    convention = scene.model.convention_value
     placement = {} if view.placed_over is None else {"placement": "fitted out"}
+    reference = " ".join(f"{axis}={at:g}" for axis, at in (view.reference or {}).items())
+    if not isinstance(convention, str):
+        convention = " ".join(f"{axis}={name}" for axis, name in convention.items())
     return {
         "scene": scene.name,
         "loop": str(view.loop),
         **placement,
-        "reference": "absolute"
-        if reference is None
-        else " ".join(f"{axis}={at:g}" for axis, at in reference.items()),
-        "component_errors": _one_text(scene.model.convention_value),
+        "reference": "absolute" if view.reference is None else reference,
+        "component_errors": convention,
         "model": "exact chain" if exact else "first order",
+        **others,
         "program": f"warpspace {__version__}",
     }
-
-
-def _one_text(value: str | dict[str, str]) -> str:
-    if isinstance(value, str):
-        return value
-    return " ".join(f"{axis}={name}" for axis, name in value.items())
 
 
 def evaluate_picture(
@@ -426,7 +405,7 @@ def evaluate_picture(
     nodes = build_grid(scene.model, scene.workspace, grid)
     field = evaluate(scene, grid=grid, loop=loop)
     coloured_values(field, component, quantity)  # raises for an unknown component
-    largest, uncertainty = float(field.norm_um.max()), None
+    largest, size, uncertainty = float(field.norm_um.max()), picture_size_mm(scene, nodes), None
     if quantity == "uncertainty":
         uncertainty = field_uncertainty(
             scene, field.error_um, nodes.coordinates, view, nodes.point_mm
@@ -434,23 +413,17 @@ def evaluate_picture(
         if uncertainty is None or not uncertainty.errors.is_known:
             remarks = () if uncertainty is None else uncertainty.errors.remarks()
             raise OptionError("; ".join(remarks) or NOT_STATED)
+    orders = second_order_words(second_order(scene, loop))
     return ScenePicture(
         view=view,
         grid=nodes,
         field=field,
-        exaggeration=choose_exaggeration(
-            exaggeration, scene.exaggeration, largest, picture_size_mm(scene, nodes)
-        ),
+        exaggeration=choose_exaggeration(exaggeration, scene.exaggeration, largest, size),
         component=component,
         quantity=quantity,
         uncertainty=uncertainty,
         colours=colours,
-        conditions=(
-            *direction_words(scene),
-            *placed_words(view),
-            *second_order_words(second_order(scene, loop)),
-            *conditions,
-        ),
+        conditions=(*direction_words(scene), *placed_words(view), *orders, *conditions),
         scene=scene,
     )
 
@@ -462,7 +435,7 @@ def picture_concept(concept: Concept, nodes: int) -> ScenePicture:
     expected, zero = expected_um(concept, grid), np.zeros(grid.nominal_mm.shape)
     along_x = np.stack([expected, zero[..., 0], zero[..., 0]], axis=-1)
     return ScenePicture(
-        view=concept.sampled.view,
+        view=concept.sampled.case.view,
         grid=grid,
         field=ErrorField(grid.nominal_mm, along_x, zero),
         exaggeration=0.0,

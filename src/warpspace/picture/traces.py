@@ -73,9 +73,10 @@ def build_traces(
         for name in rotary:
             low, high = axes[name].travel
             turn = low + (min(high, low + FULL_TURN_DEG) - low) * sweep
+            still = np.ones(samples)
             coordinates[name] = np.stack(
                 [
-                    turn if trace.axis == name else np.full(samples, trace.at[name])
+                    trace.at.get(name, 0.0) * still if trace.axis != name else turn
                     for trace in traces
                 ]
             )
@@ -141,35 +142,21 @@ class TraceLines:
         return deform(self.nominal_mm, self.error_um, self.exaggeration)
 
     def each(self) -> Iterator[TraceLine]:
-        for number, trace in enumerate(self.group.traces):
-            yield TraceLine(
-                trace,
-                self.group.loop,
-                self.nominal_mm[number],
-                self.error_um[number],
-                self.actual_mm[number],
-            )
+        lines = zip(self.group.traces, self.nominal_mm, self.error_um, self.actual_mm, strict=True)
+        for trace, nominal_mm, error_um, actual_mm in lines:
+            yield TraceLine(trace, self.group.loop, nominal_mm, error_um, actual_mm)
 
 
 def evaluate_traces(
     scene: Scene, exaggeration: float, samples: int = SAMPLES
 ) -> tuple[TraceLines, ...]:
-    groups = build_traces(scene.model, scene.trace_points_mm, scene.workspace.positions, samples)
-    return tuple(
-        TraceLines(
-            group,
-            group.nominal_mm,
-            evaluate_first_order(
-                scene.model,
-                scene.errors,
-                group.coordinates,
-                scene.view(group.loop),
-                group.nominal_mm,
-            ).error_um,
-            exaggeration,
-        )
-        for group in groups
-    )
+    groups: list[TraceLines] = []
+    model, positions = scene.model, scene.workspace.positions
+    for group in build_traces(model, scene.trace_points_mm, positions, samples):
+        view, points = scene.view(group.loop), group.nominal_mm
+        field = evaluate_first_order(model, scene.errors, group.coordinates, view, points)
+        groups.append(TraceLines(group, points, field.error_um, exaggeration))
+    return tuple(groups)
 
 
 def trace_lines(groups: Sequence[TraceLines]) -> tuple[TraceLine, ...]:

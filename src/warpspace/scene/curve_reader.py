@@ -236,7 +236,7 @@ class CurveReader:
             (lambda _file, _column: ()) if constant else self.folder and self._csv_points,
             axis=self.axis,
             axes=self.axes,
-            curve=lambda inner, path: self._read(inner, text_files.location(where, path), constant),
+            nested=lambda part, path: self._read(part, text_files.location(where, path), constant),
         )
         table = cast("dict[str, object]", raw) if isinstance(raw, dict) else {}
         form_of_table = find_form(table)

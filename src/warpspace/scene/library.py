@@ -15,7 +15,7 @@ from warpspace.exceptions import OptionError, SceneError, near_miss
 from warpspace.field.grid import Workspace, find_volume_axes
 from warpspace.kinematics.model import ComponentErrors, Model
 from warpspace.machine import limits
-from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, sort_axes
+from warpspace.machine.axes import PARAMETERS, is_linear, sort_axes
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.simple import Constant
 from warpspace.machine.curves.table import TableCurve
@@ -31,7 +31,7 @@ from warpspace.machine.errors import (
 from warpspace.resources import scenes_dir
 from warpspace.scene import machine_library, schema
 from warpspace.scene.curve_reader import GUIDES, CurveReader, read_csv_runs
-from warpspace.scene.model import PartSource, Scene, scene_notes
+from warpspace.scene.model import PartSource, Scene, curve_span, scene_notes, spanning_axes
 from warpspace.scene.notes import TOLERANCES, Note
 from warpspace.scene.scene_writer import Notation, convert_covariance, matrix_digest, read_errors
 from warpspace.scene.schema import Problems
@@ -258,22 +258,13 @@ def _workspace(raw: Mapping[str, object], machine: Machine, problems: Problems) 
 
 
 def _complete(stated: Mapping[str, Range], machine: Machine) -> dict[str, Range]:
-    spanned = {
-        direction_index(name)
-        for name, (low, high) in stated.items()
-        if is_linear(name) and low < high
-    }
+    moving = [name for name, (low, high) in stated.items() if low < high]
+    spanning = spanning_axes([*moving, *(name for name in machine.axes if name not in stated)])
     ranges: dict[str, Range] = {}
     for name, axis in machine.axes.items():
-        if name in stated:
-            ranges[name] = stated[name]
-        elif axis.is_linear and axis.index not in spanned:
-            ranges[name] = axis.travel
-            spanned.add(axis.index)
-        else:
-            low, high = axis.travel
-            at = min(max(0.0, low), high) if axis.is_linear else 0.0
-            ranges[name] = (at, at)
+        low, high = axis.travel
+        at = min(max(0.0, low), high) if axis.is_linear else 0.0
+        ranges[name] = stated.get(name, axis.travel if name in spanning else (at, at))
     return ranges
 
 
@@ -347,8 +338,7 @@ class _Document:
     def curves(self, key: str) -> CurveReader:
         """Return the reader of the curves of an error, over `Scene.axis_span`."""
         axis = PARAMETERS[key].axis
-        low, high = self.workspace.ranges[axis]
-        span = (low, high) if low < high else self.machine.axes[axis].travel
+        span = curve_span(self.machine, self.workspace, axis)
         return CurveReader(self.problems, span, axis, self.machine.axes, self.folder)
 
     def errors(self) -> ErrorSet:

@@ -124,12 +124,10 @@ def read_machine(
         problems.add(f"{prefix}chain", str(error))
         return None
     tables = {part: section[part] for part in ("offset_mm", "rotation_deg", "travel", "direction")}
-    for part, entries in {**tables, **{k: section[k] for k in ("gantry", "columns")}}.items():
-        frames = (
-            *chain.axes,
-            *(definition.FIXED_FRAMES if part in ("offset_mm", "rotation_deg") else ()),
-        )
-        problems.only(f"{prefix}{part}", entries, frames, "frame of this machine")
+    for part in (*tables, "gantry", "columns"):
+        fixed = definition.FIXED_FRAMES if part in ("offset_mm", "rotation_deg") else ()
+        frames = (*chain.axes, *fixed)
+        problems.only(f"{prefix}{part}", section[part], frames, "frame of this machine")
     machine = definition.build_machine(
         chain,
         **tables,

@@ -1,6 +1,6 @@
 """Validated scenes, and the evaluation of their error fields."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -51,6 +51,19 @@ class PartSource:
         """Return the path of a file; None where none is stated, or the scene has no folder."""
         file: str = getattr(self, name)
         return str(Path(self.folder, file)) if file and self.folder else None
+
+
+def curve_span(machine: Machine, workspace: Workspace, axis: str) -> tuple[float, float]:
+    low, high = workspace.ranges[axis]
+    return (low, high) if low < high else machine.axes[axis].travel
+
+
+def spanning_axes(names: Iterable[str]) -> tuple[str, ...]:
+    """List the first linear axis along each direction."""
+    axis_of: dict[int, str] = {}
+    for name in filter(axes.is_linear, names):
+        axis_of.setdefault(axes.direction_index(name), name)
+    return tuple(axis_of.values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,8 +139,7 @@ class Scene:
 
     def axis_span(self, axis: str) -> tuple[float, float]:
         """Return the range of the curves of an axis, mm or degrees; without one its travel."""
-        low, high = self.workspace.ranges[axis]
-        return (low, high) if low < high else self.machine.axes[axis].travel
+        return curve_span(self.machine, self.workspace, axis)
 
     @property
     def default_loop(self) -> Loop:

@@ -21,7 +21,7 @@ from warpspace.machine.definition import ORIGIN, BodySource, Machine, Vector, de
 from warpspace.machine.errors import Constant, Covariance, ErrorSet
 from warpspace.machine.limits import MIN_NUMBER
 from warpspace.scene.machine_library import load_machine, machine_names
-from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, curve_span
 from warpspace.scene.notes import Note, note_to_toml
 from warpspace.scene.text_files import spell_key
 
@@ -59,9 +59,7 @@ def extend_to_ranges(errors: ErrorSet, model: Model, workspace: Workspace) -> Er
     """Return errors whose curves have the ranges of a scene, with the same values."""
     functions = dict(errors.functions)
     for key, function in errors.functions.items():
-        axis = parameter(key).axis
-        low, high = workspace.ranges[axis]
-        span = (low, high) if low < high else model.machine.axes[axis].travel
+        span = curve_span(model.machine, workspace, parameter(key).axis)
         if function.span != span:
             functions[key] = replace(function.for_span(span), span=span)
     return ErrorSet(functions)
@@ -71,24 +69,26 @@ def read_errors(
     model: Model, errors: ErrorSet, workspace: Workspace, notation: Notation, source: str
 ) -> ErrorSet:
     errors = convert_squareness(model.machine, errors, notation.squareness)
-    lines = notation.measuring_line_mm
-    if not lines:
-        return errors
-    spans = covered_spans(model, workspace)
     try:
-        moved = move_measuring_line(model, errors, spans, lines, to_origin=True)
-        return extend_to_ranges(moved, model, workspace)
+        return _move_errors(model, errors, workspace, notation, to_origin=True)
     except OptionError as error:
         raise SceneError(source, [f"convention.measuring_line_mm: {error}"]) from None
 
 
 def write_errors(scene: Scene, notation: Notation) -> ErrorSet:
-    spans = covered_spans(scene.model, scene.workspace)
-    lines, errors = notation.measuring_line_mm, scene.errors
-    if lines:
-        moved = move_measuring_line(scene.model, errors, spans, lines, to_origin=False)
-        errors = extend_to_ranges(moved, scene.model, scene.workspace)
-    return convert_squareness(scene.machine, errors, notation.squareness)
+    moved = _move_errors(scene.model, scene.errors, scene.workspace, notation, to_origin=False)
+    return convert_squareness(scene.machine, moved, notation.squareness)
+
+
+def _move_errors(
+    model: Model, errors: ErrorSet, workspace: Workspace, notation: Notation, *, to_origin: bool
+) -> ErrorSet:
+    lines = notation.measuring_line_mm
+    if not lines:
+        return errors
+    spans = covered_spans(model, workspace)
+    moved = move_measuring_line(model, errors, spans, lines, to_origin=to_origin)
+    return extend_to_ranges(moved, model, workspace)
 
 
 def convert_covariance(

@@ -10,18 +10,11 @@ from typing import Any
 from warpspace.exceptions import SHOWN_PROBLEMS, near_miss
 from warpspace.kinematics.conversion import SquarenessSign
 from warpspace.kinematics.model import ComponentErrors, Loop, convention_names
-from warpspace.machine import limits
+from warpspace.machine import errors, limits
 from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.curve import MISSING, Path, ValueReader
 from warpspace.machine.curves.table import MAX_COLUMN_NAME, MAX_FILE_NAME
 from warpspace.machine.definition import MESH_UNITS, ORIGIN, TOOL_SHAPES, BodySource
-from warpspace.machine.errors import (
-    RUN_DIRECTIONS,
-    TOLERANCE_CLASSES,
-    UNKNOWN,
-    Tolerance,
-    TravelRun,
-)
 from warpspace.scene.notes import KINDS, MEASURES, STATUSES, Note, NoteAnchor, Reply
 from warpspace.scene.text_files import location, spell_value
 
@@ -267,13 +260,13 @@ PART = TableSchema(
         "tcp": (_one_of(("program", "always", "never")), ""),
     }
 )
-DEFAULTS = _by_name(_number(*_HALF_WIDTH), TOLERANCE_CLASSES)
+DEFAULTS = _by_name(_number(*_HALF_WIDTH), errors.TOLERANCE_CLASSES)
 _RANGE = TableSchema(
     {
         "centre": (_number(-limits.MAX_ERROR, limits.MAX_ERROR), 0.0),
         "half_width": (_number(*_HALF_WIDTH), MISSING),
     },
-    Tolerance,
+    errors.Tolerance,
 )
 _WIDTH = _number(*_HALF_WIDTH, "a half width or { centre = , half_width = }")
 _PLACE = _number(*LIMIT, expected="a number or [lower, upper]")
@@ -290,10 +283,13 @@ def workspace_range(reader: ValueReader, value: Any, path: Path) -> tuple[float,
 
 _RUN = TableSchema(
     {
-        "direction": (_choice(lambda: RUN_DIRECTIONS, "{} or {} (not known)"), UNKNOWN),
+        "direction": (
+            _choice(lambda: errors.RUN_DIRECTIONS, "{} or {} (not known)"),
+            errors.UNKNOWN,
+        ),
         "points": (_list(_READING, limits.MAX_POINTS, min_count=1), MISSING),
     },
-    TravelRun,
+    errors.TravelRun,
 )
 RUNS = TableSchema({"runs": (_list(_RUN, limits.MAX_RUNS, min_count=1), MISSING)})
 CSV_RUNS = TableSchema(
@@ -387,7 +383,7 @@ _FEATURE = TableSchema(
 FEATURES = TableSchema({"features": (_list(_FEATURE, limits.MAX_TOLERANCES, 1), MISSING)})
 
 
-def tolerance(reader: ValueReader, value: Any, path: Path) -> Tolerance:
+def tolerance(reader: ValueReader, value: Any, path: Path) -> errors.Tolerance:
     if isinstance(value, dict):
         return _RANGE(reader, value, path)
-    return Tolerance(0.0, _WIDTH(reader, value, path))
+    return errors.Tolerance(0.0, _WIDTH(reader, value, path))

@@ -9,7 +9,7 @@ import tomli_w
 from warpspace.machine.axes import ErrorKind, direction_index, is_linear, parameter
 from warpspace.machine.definition import ORIGIN, Chain, Range, Vector, build_machine, parse_chain
 from warpspace.scene.library import parse_scene
-from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, spanning_axes
 
 HORIZONTAL_DEG: Vector = (90.0, 0.0, 180.0)
 """Turns the frames of a machine with a horizontal spindle, degrees: y points up, z to the rear."""
@@ -48,8 +48,9 @@ class StarterDimensions:
 
 
 def compute_dimensions(chain: Chain) -> StarterDimensions:
-    spanning = _spanning(chain)
-    horizontal = _is_horizontal(chain)
+    spanning = spanning_axes(chain.axes)
+    turning = [direction_index(axis) for axis in chain.workpiece if not is_linear(axis)]
+    horizontal = 2 not in turning and turning[-1:] == [1]
     up = 1 if horizontal else 2
     arms = () if horizontal else _arms(chain)
     travel = {axis: _travel(axis, up, axis in spanning, axis in arms) for axis in chain.axes}
@@ -72,21 +73,8 @@ def compute_dimensions(chain: Chain) -> StarterDimensions:
     )
 
 
-def _is_horizontal(chain: Chain) -> bool:
-    turning = [direction_index(axis) for axis in chain.workpiece if not is_linear(axis)]
-    return 2 not in turning and turning[-1:] == [1]
-
-
-def _spanning(chain: Chain) -> tuple[str, ...]:
-    axis_of: dict[int, str] = {}
-    for axis in chain.axes:
-        if is_linear(axis):
-            axis_of.setdefault(direction_index(axis), axis)
-    return tuple(axis_of.values())
-
-
 def _arms(chain: Chain) -> tuple[str, ...]:
-    if any(direction_index(axis) != 2 for axis in _spanning(chain)):
+    if any(direction_index(axis) != 2 for axis in spanning_axes(chain.axes)):
         return ()
     turning = [axis for axis in chain.tool if not is_linear(axis) and direction_index(axis) == 2]
     return tuple(turning[: len(ARM_RANGES)])

@@ -15,16 +15,7 @@ from pathlib import Path
 from typing import TextIO
 
 from warpspace.exceptions import OutputError, SceneError
-from warpspace.machine.limits import (
-    MAX_CSV_COLUMNS,
-    MAX_CSV_LINE,
-    MAX_CSV_LINES,
-    MAX_KEY_PARTS,
-    MAX_KEYS,
-    MAX_MARKS,
-    MAX_NESTING,
-    MAX_SCENE_BYTES,
-)
+from warpspace.machine import limits
 
 if sys.platform != "win32":
     import fcntl
@@ -63,15 +54,18 @@ def check_outline(text: str, source: str) -> None:
                 depth = max(depth - 1, 0)
             elif mark in "[{":
                 depth += 1
-        if count >= MAX_MARKS:
-            problem = f"more than {MAX_MARKS:,} brackets, commas, dots and lines; expected long"
+        if count >= limits.MAX_MARKS:
+            problem = (
+                f"more than {limits.MAX_MARKS:,} brackets, commas, dots and lines; expected long"
+            )
             problem += " tables in CSV files of their own"
-        elif dots >= MAX_KEY_PARTS:
-            problem = f"a key of over {MAX_KEY_PARTS} parts; expected at most {MAX_KEY_PARTS}"
-        elif keys > MAX_KEYS:
-            problem = f"more than {MAX_KEYS:,} parts of keys"
-        elif depth > MAX_NESTING:
-            problem = f"is not valid TOML: nested too deeply, more than {MAX_NESTING} levels"
+        elif dots >= limits.MAX_KEY_PARTS:
+            expected = f"expected at most {limits.MAX_KEY_PARTS}"
+            problem = f"a key of over {limits.MAX_KEY_PARTS} parts; {expected}"
+        elif keys > limits.MAX_KEYS:
+            problem = f"more than {limits.MAX_KEYS:,} parts of keys"
+        elif depth > limits.MAX_NESTING:
+            problem = f"is not valid TOML: nested too deeply, more than {limits.MAX_NESTING} levels"
         else:
             continue
         line = text.count("\n", 0, match.start()) + 1
@@ -127,7 +121,7 @@ def lock_file(path: Path) -> Generator[None]:
     Where there are no locks (Windows, some network drives), pass the content read to
     `warpspace.outputs.file_output.write_atomically`, which refuses a file that has changed.
     """
-    check_file(path, MAX_SCENE_BYTES, str(path))
+    check_file(path, limits.MAX_SCENE_BYTES, str(path))
     last_s = clock.monotonic() + LOCK_WAIT_S
     with ExitStack() as opened:
         while sys.platform != "win32":
@@ -198,12 +192,9 @@ def _shorten(text: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    shortened = text[: MAX_VALUE_LENGTH + 1]
-    return (
-        '"'
-        + "".join(_ESCAPES.get(c, c if c.isprintable() else f"\\u{ord(c):04x}") for c in shortened)
-        + '"'
-    )
+    letters = text[: MAX_VALUE_LENGTH + 1]
+    spelling = [_ESCAPES.get(c, c if c.isprintable() else f"\\u{ord(c):04x}") for c in letters]
+    return f'"{"".join(spelling)}"'
 
 
 def _spell(value: object, depth: int) -> str:
@@ -399,13 +390,15 @@ class CsvRows:
             raise SceneError(self.source, self.problems)
 
     def _lines(self) -> Iterator[str]:
-        for line in iter(lambda: self._file.readline(MAX_CSV_LINE + 1), ""):
+        for line in iter(lambda: self._file.readline(limits.MAX_CSV_LINE + 1), ""):
             self._number += 1
-            if len(line) > MAX_CSV_LINE:
-                problem = f"is longer than {MAX_CSV_LINE:,} characters; expected at most so many"
+            if len(line) > limits.MAX_CSV_LINE:
+                problem = (
+                    f"is longer than {limits.MAX_CSV_LINE:,} characters; expected at most so many"
+                )
                 raise SceneError(self.source, [f"line {self._number} {problem}"])
-            if self._number > MAX_CSV_LINES:
-                problem = f"has more than {MAX_CSV_LINES:,} lines; expected at most so many"
+            if self._number > limits.MAX_CSV_LINES:
+                problem = f"has more than {limits.MAX_CSV_LINES:,} lines; expected at most so many"
                 raise SceneError(self.source, [problem])
             if not self._since_row and line.lstrip().startswith("#"):
                 continue
@@ -426,8 +419,8 @@ class CsvRows:
             for row in csv.reader(lines, delimiter=self.mark, strict=True):
                 self._since_row = 0
                 cells = [cell.strip() for cell in row]
-                if len(cells) > MAX_CSV_COLUMNS:
-                    problem = f"has {len(cells)} fields; expected at most {MAX_CSV_COLUMNS}"
+                if len(cells) > limits.MAX_CSV_COLUMNS:
+                    problem = f"has {len(cells)} fields; expected at most {limits.MAX_CSV_COLUMNS}"
                     raise SceneError(self.source, [f"line {self._number} {problem}"])
                 if any(cells):
                     yield self._number, cells

@@ -14,18 +14,10 @@ from warpspace.exceptions import OptionError, SceneError, near_miss
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import Model
 from warpspace.kinematics.transforms import inverse, roll_pitch_yaw_deg
-from warpspace.machine import limits
+from warpspace.machine import definition, limits
 from warpspace.machine.axes import MAX_AXES, direction_index, is_axis_name, is_linear
-from warpspace.machine.definition import (
-    Chain,
-    Machine,
-    Range,
-    Vector,
-    build_machine,
-    default_travel,
-)
 from warpspace.machine.errors import ToleranceSet
-from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, spanning_axes
 from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.scene.starter import error_lines
 from warpspace.scene.text_files import one_line, read_text
@@ -109,10 +101,9 @@ def not_installed() -> OptionError:
 
 def _problems(robot: Any) -> Iterable[str]:
     links = [link.name for link in robot.links]
-    for name in _twice(links):
-        yield f"link {name!r} occurs twice; expected each name once"
-    for name in _twice([joint.name for joint in robot.joints]):
-        yield f"joint {name!r} occurs twice; expected each name once"
+    for what, names in (("link", links), ("joint", [joint.name for joint in robot.joints])):
+        for name in sorted(str(name) for name, count in Counter(names).items() if count > 1):
+            yield f"{what} {name!r} occurs twice; expected each name once"
     if not links:
         yield "has no link"
         return
@@ -137,10 +128,6 @@ def _problems(robot: Any) -> Iterable[str]:
     elif len(roots) > 1:
         listed = ", ".join(map(repr, roots[:6]))
         yield f"links {listed} hang on nothing; expected one such link, the frame of the machine"
-
-
-def _twice(names: list[str]) -> list[str]:
-    return sorted(str(name) for name, count in Counter(names).items() if count > 1)
 
 
 def root_of(robot: Any) -> str:
@@ -176,11 +163,11 @@ def axis_frame(origin_mm: Array, direction: Array) -> tuple[Array, int]:
 
 
 def relative_places(
-    poses: dict[str, Array], chain: Chain
-) -> tuple[dict[str, Vector], dict[str, Vector]]:
+    poses: dict[str, Array], chain: definition.Chain
+) -> tuple[dict[str, definition.Vector], dict[str, definition.Vector]]:
     """Turn frames in R into offsets and rotations of each in the frame before it."""
-    offsets: dict[str, Vector] = {}
-    rotations: dict[str, Vector] = {}
+    offsets: dict[str, definition.Vector] = {}
+    rotations: dict[str, definition.Vector] = {}
     for branch, end in ((chain.tool, "t"), (chain.workpiece, "w")):
         before = "R"
         for frame in (*branch, end):
@@ -191,7 +178,7 @@ def relative_places(
     return offsets, {frame: turn for frame, turn in rotations.items() if any(turn)}
 
 
-def _rounded(values: Array, digits: int) -> Vector:
+def _rounded(values: Array, digits: int) -> definition.Vector:
     x, y, z = (round(float(value), digits) + 0.0 for value in values)
     return x, y, z
 
@@ -208,7 +195,7 @@ WORKPIECE_NAMES = ("workpiece", "work", "w", "table")
 class RobotMachine:
     """A machine read from a robot, and the frames of its links."""
 
-    machine: Machine
+    machine: definition.Machine
     # by link: its frame of the machine, and its pose in that frame, [4, 4] in mm, joints at zero
     frame_of: dict[str, tuple[str, Array]]
     notes: list[str] = field(default_factory=list[str])  # on converted or ignored entries
@@ -266,16 +253,16 @@ def place_robot(robot: Any, source: str, tool: str = "", workpiece: str = "") ->
     }
     names = _axis_names(joints, directions)
     poses = {"R": np.eye(4), "t": _pose_mm(branches[0]), "w": _pose_mm(branches[1])}
-    travel: dict[str, Range] = {}
+    travel: dict[str, definition.Range] = {}
     direction: dict[str, int] = {}
     for joint in joints:
         axis = names[joint.name]
         poses[axis], direction[axis] = axis_frame(places[joint.name][:3, 3], directions[joint.name])
         travel[axis] = _travel(joint, axis, notes)
     sides = (tuple(names[one.name] for one in way if one.name in names) for way in branches[::-1])
-    chain = Chain(*sides)
+    chain = definition.Chain(*sides)
     offsets, rotations = relative_places(poses, chain)
-    machine = build_machine(
+    machine = definition.build_machine(
         chain,
         offset_mm=offsets,
         rotation_deg=rotations,
@@ -375,13 +362,13 @@ def _axis_names(joints: Sequence[Any], directions: dict[str, Array]) -> dict[str
     return {joint.name: axis_of[joint.name] for joint in joints}
 
 
-def _travel(joint: Any, axis: str, notes: list[str]) -> Range:
+def _travel(joint: Any, axis: str, notes: list[str]) -> definition.Range:
     limit = joint.limit
     if joint.type == "continuous":
         return (0.0, 360.0) if direction_index(axis) == 2 else (-180.0, 180.0)
     ends = () if limit is None else (limit.lower, limit.upper)
     if len(ends) != 2 or None in ends or not np.isfinite(np.array(ends, float)).all():
-        low, high = default_travel(axis)
+        low, high = definition.default_travel(axis)
         notes.append(f"joint {joint.name!r} has no limits: axis {axis} gets {low:g} … {high:g}")
         return low, high
     per_unit = MM_PER_M if joint.type == "prismatic" else 180.0 / np.pi
@@ -422,7 +409,7 @@ LONGEST_NOTE = 300
 
 
 def imported_text(
-    machine: Machine, source: str, notes: Sequence[str], meshes: Mapping[str, str]
+    machine: definition.Machine, source: str, notes: Sequence[str], meshes: Mapping[str, str]
 ) -> str:
     scene = Scene(
         name="imported",
@@ -447,17 +434,14 @@ def _plain(text: str) -> str:
     return printable if len(printable) <= LONGEST_NOTE else printable[: LONGEST_NOTE - 1] + "…"
 
 
-def _ranges(machine: Machine) -> dict[str, Range]:
-    spanned: set[int] = set()
-    ranges: dict[str, Range] = {}
+def _ranges(machine: definition.Machine) -> dict[str, definition.Range]:
+    spanning = spanning_axes(machine.axes)
+    ranges: dict[str, definition.Range] = {}
     for name, axis in machine.axes.items():
         low, high = axis.travel
         at = min(max(0.0, low), high)
-        ranges[name] = (at, at)
-        if is_linear(name) and direction_index(name) not in spanned:
-            spanned.add(direction_index(name))
-            ranges[name] = axis.travel
-    free = 3 - len(spanned)
+        ranges[name] = axis.travel if name in spanning else (at, at)
+    free = 3 - len(spanning)
     turning = [name for name in machine.chain.tool if not is_linear(name)]
     if free > 1:
         for name in turning[:free]:

@@ -1,23 +1,26 @@
 """Comparison of every number printed in the thesis with the computed one."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from itertools import groupby
+from pathlib import Path
+from typing import Any, NamedTuple
 
+from warpspace.analysis.blocks import Block, Column, Table
 from warpspace.analysis.commands.gains import Gain, gains_at, gains_max
 from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.sampling.cases import Case, SamplingPlan
 from warpspace.analysis.sampling.distribution import Distribution, build_draws
 from warpspace.analysis.sampling.machine_sampling import SampleStatistics, montecarlo
-from warpspace.analysis.tolerance_check import Check, check_errors, measured
+from warpspace.analysis.statistics import Check, check_errors, measured
 from warpspace.field.evaluate import View
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.axes import ErrorKind, parameter
 from warpspace.machine.errors import ToleranceSet
 from warpspace.scene.library import load_scene
 from warpspace.scene.model import Scene
-from warpspace.thesis_example.printed import MACHINE, MEASURED_MACHINES, printed_tables
+from warpspace.thesis_example import MACHINE, MEASURED_MACHINES, printed_tables
 
 
 class ThesisCase(NamedTuple):
@@ -267,3 +270,69 @@ def thesis() -> tuple[Row, ...]:
         *squareness_tables(case),
         *table_5_5(case),
     )
+
+
+# Presentation: blocks, a JSON object, a page in Markdown.
+
+TABLE_COLUMNS = (
+    Column(leads=True),
+    Column("quantity", wraps=True, leads=True),
+    Column("printed", "s", wraps=True),
+    Column("ours", "s", wraps=True, joins=True),
+    Column("unit"),
+)
+
+
+def _by_source(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    return {source: list(group) for source, group in groupby(rows, lambda row: row.source)}
+
+
+def thesis_blocks(rows: Sequence[Row]) -> Iterator[Block]:
+    for source, group in _by_source(rows).items():
+        cells = [
+            (
+                "" if row.agrees else "≠",
+                row.key,
+                format_number(row, row.printed),
+                format_number(row, row.computed, extra_digits=1),
+                row.unit,
+            )
+            for row in group
+        ]
+        agreeing = sum(row.agrees for row in group)
+        yield Table(TABLE_COLUMNS, cells, f"{source}: {agreeing} of {len(group)} agree")
+        yield ""
+    different = [row for row in rows if not row.agrees]
+    yield f"{len(rows) - len(different)} of {len(rows)} agree. The others:"
+    for row in different:
+        printed = format_number(row, row.printed)
+        computed = format_number(row, row.computed, extra_digits=1)
+        yield f"  {row.source}: {row.key}: printed {printed}, ours {computed} {row.unit}"
+        yield f"      {row.note}"
+
+
+def thesis_json(rows: Sequence[Row]) -> dict[str, Any]:
+    keys = ("source", "key", "printed", "computed", "agrees")
+    return {
+        "rows": [
+            {key: getattr(row, key) for key in ((*keys, "note") if row.note else keys)}
+            for row in rows
+        ]
+    }
+
+
+def markdown_page(rows: Sequence[Row]) -> str:
+    from jinja2 import StrictUndefined, Template  # other commands start without it
+
+    text = Path(__file__).with_name("thesis.md.j2").read_text("utf-8")
+    page = Template(text, undefined=StrictUndefined, keep_trailing_newline=True)
+    return page.render(rows=rows, groups=_by_source(rows), format_number=format_number)
+
+
+def format_number(row: Row, value: float | str, extra_digits: int = 0) -> str:
+    """Format a number of a row with the printed digits, or more."""
+    if isinstance(value, str):
+        return value
+    if value == int(value) and row.digits == 0:
+        return f"{value:.0f}"
+    return f"{value:.{row.digits + extra_digits}f}"

@@ -14,7 +14,6 @@ from warpspace.analysis.sampling.distribution import Distribution, build_draws, 
 from warpspace.analysis.sampling.machine_sampling import montecarlo
 from warpspace.analysis.sampling.tolerance_search import build_ensemble
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import View
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.definition import build_machine
@@ -24,8 +23,7 @@ from warpspace.scene.library import load_scene
 MODEL = Model(build_machine("wFXYZt"), tool_point_mm=(0.0, 0.0, -200.0))
 HERE = Workspace({"X": (0.0, 0.0), "Y": (0.0, 0.0), "Z": (0.0, 0.0)})
 """One point: the tool tip 200 mm below all axes, where every gain is known by hand."""
-LEVER = 0.2
-"""µm per µrad: 200 mm times a microradian."""
+LEVER = 0.2  # µm per µrad: 200 mm times a microradian
 PROMISED = machines_needed(100_000, 0.95) / 100_000
 """Share of the machines that keeps the limit where the lower end of its interval is 95 %."""
 Z95 = float(special.ndtri(0.5 + PROMISED / 2.0))
@@ -43,8 +41,8 @@ def widths(draws, limit_um=40.0, plan=None, widest=1000.0, **wish):
     return dict(zip(draws.keys, found.half_width, strict=True)), found
 
 
-NORMAL = Distribution.NORMAL
-UNIFORM = Distribution.UNIFORM
+NORMAL, UNIFORM = Distribution.NORMAL, Distribution.UNIFORM
+ISOTROPIC = ("EXX", "EYX", "EZX")
 
 
 @pytest.mark.parametrize(
@@ -57,39 +55,19 @@ UNIFORM = Distribution.UNIFORM
         # 10 + w u within ±40: only the upper end is met, by (1 + 30/w)/2 of the machines
         (UNIFORM, {"centre": 10.0, "EXX": 5.0}, {"probability": 0.9}, {"EXX": 30.0 / 0.8}, 0.008),
         # isotropic normal errors follow Maxwell
-        (
-            NORMAL,
-            dict.fromkeys(("EXX", "EYX", "EZX"), 1.0),
-            {"probability": 0.99},
-            dict.fromkeys(("EXX", "EYX", "EZX"), 3.0 * 40.0 / stats.maxwell.ppf(0.99)),
-            0.03,
-        ),
+        (NORMAL, dict.fromkeys(ISOTROPIC, 1.0), {"probability": 0.99},
+         dict.fromkeys(ISOTROPIC, 3.0 * 40.0 / stats.maxwell.ppf(0.99)), 0.03),
         # what is fixed stays and takes its part of the variance
-        (
-            NORMAL,
-            {"EXX": 40.0, "EXY": 1.0},
-            {"fixed": ("EXX",)},
-            {"EXX": 40.0, "EXY": math.sqrt((3.0 * 40.0 / Z95) ** 2 - 40.0**2)},
-            0.012,
-        ),
+        (NORMAL, {"EXX": 40.0, "EXY": 1.0}, {"fixed": ("EXX",)},
+         {"EXX": 40.0, "EXY": math.sqrt((3.0 * 40.0 / Z95) ** 2 - 40.0**2)}, 0.012),
         # the widest is never passed, and the others use what is left
-        (
-            NORMAL,
-            {"EXX": 40.0, "EBX": 1.0},
-            {"widest": 70.0},
-            {"EBX": 70.0, "EXX": math.sqrt((3.0 * 40.0 / Z95) ** 2 - (LEVER * 70.0) ** 2)},
-            0.01,
-        ),
+        (NORMAL, {"EXX": 40.0, "EBX": 1.0}, {"widest": 70.0},
+         {"EBX": 70.0, "EXX": math.sqrt((3.0 * 40.0 / Z95) ** 2 - (LEVER * 70.0) ** 2)}, 0.01),
         # zero holds; a rotation about the line on which the tool point lies has no lever
-        (
-            UNIFORM,
-            {"EXX": 5.0, "EYY": 0.0, "ECZ": 7.0},
-            {"probability": 0.9},
-            {"EXX": 40.0 / 0.9, "EYY": 0.0, "ECZ": 7.0},
-            0.006,
-        ),
+        (UNIFORM, {"EXX": 5.0, "EYY": 0.0, "ECZ": 7.0}, {"probability": 0.9},
+         {"EXX": 40.0 / 0.9, "EYY": 0.0, "ECZ": 7.0}, 0.006),
     ],
-)
+)  # fmt: skip
 def test_widths_have_their_closed_forms(distribution, draws, wish, expected, near):
     found, result = widths(draws_of(distribution, **draws), **wish)
     assert found == pytest.approx(expected, rel=near)
@@ -160,22 +138,18 @@ def test_where_the_variance_decides_widths_go_with_the_cube_root_of_cost_by_squa
 def test_the_measured_machine_keeps_the_limit_on_machines_of_its_own(loop, over):
     scene = load_scene("dvf5000_proposed")
     found = warpspace.allocate(scene, limit_um=60.0, loop=loop, over=over, samples=40_000, seed=4)
-    own = {**scene.tolerances.individual}
-    own |= {k: Tolerance(scene.tolerances.get(k).centre, w) for k, w in found.tolerances.items()}
-    allocated = replace(scene, tolerances=replace(scene.tolerances, individual=own))
-    run = warpspace.montecarlo(
-        allocated, loop=loop, over=over, samples=40_000, seed=99, limit_um=60.0
-    )
-    assert run.probability.probability == pytest.approx(0.95, abs=0.006)
-    assert found.after.low - 0.003 < run.probability.probability < found.after.high + 0.003
+    allocated = replace(scene, tolerances=scene.tolerances.with_half_widths(found.tolerances))
+    options = {"loop": loop, "over": over, "samples": 40_000, "seed": 99, "limit_um": 60.0}
+    share = warpspace.montecarlo(allocated, **options).probability.probability
+    assert share == pytest.approx(0.95, abs=0.006)
+    assert found.after.low - 0.003 < share < found.after.high + 0.003
 
 
 def test_no_other_proportions_are_cheaper():
     scene = load_scene("dvf5000_first")
     found = warpspace.allocate(scene, limit_um=40.0, over="max", samples=50_000, seed=1)
-    draws, view = found.draws, View()
-    plan = SamplingPlan(20_000, 77, Reduction.MAX)
-    judge = build_ensemble(Case(scene.model, draws, scene.workspace, view, plan))
+    draws, plan = found.draws, SamplingPlan(20_000, 77, Reduction.MAX)
+    judge = build_ensemble(Case(scene.model, draws, scene.workspace, plan=plan))
     free, rng = found.free, np.random.default_rng(5)
 
     def cost(half):

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import warpspace
-from warpspace.analysis.statistics import statistics, volume_statistics
-from warpspace.analysis.tolerance_check import Check, check_errors, shear
+from warpspace.analysis.statistics import Check, check_errors, shear, statistics, volume_statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField
 from warpspace.field.grid import build_grid
@@ -57,18 +56,12 @@ def test_statistics_of_the_volume_of_a_linear_error_are_those_of_its_integral():
     ("value", "passes"),
     [(-14.0, True), (-2.0, True), (-14.01, False), (-1.99, False), (-8.0, True)],
 )
-def test_limits_belong_to_the_tolerance(value, passes):
+def test_limits_belong_to_the_tolerance_and_none_gives_no_verdict(value, passes):
     assert Check("EAX", value, -8.0, 6.0).passes is passes
-
-
-def test_without_a_tolerance_there_is_no_verdict():
     (check,) = check_errors(ErrorSet({"EAX": Constant((0, 1), 3.0)}), ToleranceSet())
     assert check.passes is None
 
 
 def test_shear_of_pure_squareness_is_the_squareness():
-    field = warpspace.evaluate(warpspace.load_scene("teach_squareness"), grid=3)
-    found = shear(field)
-    assert found["XY"] == pytest.approx(30.0)
-    assert found["XZ"] == pytest.approx(0.0, abs=1e-9)
-    assert found["YZ"] == pytest.approx(0.0, abs=1e-9)
+    field = warpspace.evaluate(load_scene("teach_squareness"), grid=3)
+    assert shear(field) == pytest.approx({"XY": 30.0, "XZ": 0.0, "YZ": 0.0}, abs=1e-9)

@@ -27,21 +27,19 @@ def test_lines_come_out_as_the_given_pairs(count):
     np.testing.assert_array_equal(values(data, primitive["indices"]).reshape(-1, 2), pairs)
     np.testing.assert_array_equal(values(data, primitive["targets"][0]["POSITION"]), -points)
     assert set(primitive["attributes"]) == {"POSITION"}
-    path = trimesh.load_scene(trimesh.util.wrap_as_stream(data), file_type="glb")
-    read = path.geometry["lines"]
-    assert sum(len(entity.points) - 1 for entity in read.entities) == len(pairs)
+    read = trimesh.load_scene(trimesh.util.wrap_as_stream(data), file_type="glb")
+    entities = read.geometry["lines"].entities
+    assert sum(len(entity.points) - 1 for entity in entities) == len(pairs)
 
 
 @pytest.mark.parametrize(("points", "kind"), [(65535, 5123), (65536, 5125)])
 def test_numbers_of_points_take_16_bits_where_they_fit(points, kind):
-    many = np.zeros((points, 3))
-    many[:, 0] = np.arange(points)
-    data = build_gltf(
-        [GltfNode("many", many, np.array([[0, 1, points - 1], [2, 3, 4], [5, 6, 7]]))]
-    )
+    many = np.arange(points)[:, None] * np.array([1.0, 0.0, 0.0])
+    triangles = np.array([[0, 1, points - 1], [2, 3, 4], [5, 6, 7]])
+    data = build_gltf([GltfNode("many", many, triangles)])
     accessor = only_primitive(data)["indices"]
     assert opened(data)[0]["accessors"][accessor]["componentType"] == kind
-    assert list(values(data, accessor)) == [0, 1, points - 1, 2, 3, 4, 5, 6, 7]
+    np.testing.assert_array_equal(values(data, accessor), triangles.ravel())
 
 
 def test_nodes_hang_under_root_and_groups_and_empty_parts_are_left_out():
@@ -59,9 +57,8 @@ def test_nodes_hang_under_root_and_groups_and_empty_parts_are_left_out():
     assert nodes[root]["name"] == "all ×2"
     children = {nodes[at]["name"]: nodes[at] for at in nodes[root]["children"]}
     assert set(children) == {"a", "bodies"}
-    below = [nodes[at] for at in children["bodies"]["children"]]
-    assert len(below) == 2
-    assert all("mesh" in node and "matrix" not in node for node in below)
+    below = [nodes[at].keys() for at in children["bodies"]["children"]]
+    assert below == [{"name", "mesh"}] * 2
     assert document["asset"] == {"version": "2.0", "generator": "w 1", "extras": {"é": 1}}
     assert [m["name"] for m in document["materials"]] == ["unlit", "glass"]
     assert document["materials"][1]["alphaMode"] == "BLEND"
@@ -77,6 +74,5 @@ def test_nan_in_the_extras_is_refused():
 
 def test_colours_are_stored_as_they_are_with_any_value():
     data = build_gltf([TRIANGLE])
-    np.testing.assert_array_equal(
-        values(data, only_primitive(data)["attributes"]["COLOR_0"]), COLOURS
-    )
+    colours = values(data, only_primitive(data)["attributes"]["COLOR_0"])
+    np.testing.assert_array_equal(colours, COLOURS)

@@ -118,14 +118,11 @@ GRID_VOLUME = Workspace(
 
 def test_grid_has_a_node_for_every_combination_of_positions():
     grid = build_grid(GRID_MODEL, GRID_VOLUME, (2, 3, 5))
-    assert grid.shape == (2, 3, 5)
-    assert grid.nominal_mm.shape == (2, 3, 5, 3)
+    assert (*grid.shape, 3) == grid.nominal_mm.shape == (2, 3, 5, 3)
     assert grid.nominal_mm[1, 1, 0].tolist() == [10.0, 15.0, 450.0]
-    assert grid.extent_mm.tolist() == [20.0, 30.0, 100.0]
-    assert grid.longest_edge_mm == 100.0
+    assert [*grid.extent_mm, grid.longest_edge_mm] == [20.0, 30.0, 100.0, 100.0]
     assert float(grid.coordinates["C"]) == 90.0
-    full = np.broadcast_arrays(*grid.coordinates.values())
-    assert full[0].shape == grid.shape
+    assert np.broadcast_arrays(*grid.coordinates.values())[0].shape == grid.shape
 
 
 @pytest.mark.parametrize(
@@ -162,9 +159,8 @@ def test_volume_on_a_turned_table_turns_with_it():
 
 
 def test_positions_are_the_middles_and_moving_leaves_the_original_alone():
+    assert GRID_VOLUME.moved({"C": 0.0}).positions["C"] == 0.0
     assert GRID_VOLUME.positions == {"X": 0.0, "Y": 15.0, "Z": 0.0, "C": 90.0}
-    moved = GRID_VOLUME.moved({"C": 0.0})
-    assert (moved.positions["C"], GRID_VOLUME.positions["C"]) == (0.0, 90.0)
 
 
 @pytest.mark.parametrize(
@@ -229,13 +225,12 @@ def test_an_axis_that_stands_elsewhere_is_fitted_out_where_it_stands_only():
 
 @pytest.mark.parametrize("machine", ["bent", "dvf5000_second", "printer"])
 def test_what_is_left_is_the_least_and_the_same_by_every_way(machine):
+    printer = 'title = "p"\nmachine = "printer_3d"\n[errors]\nEC0Y = 500\nEAX = { ramp = 30 }\n'
     scene = {
-        "bent": lambda: _scene("EXX = { poly = [0, 0.1, 1e-4] }\nEC0Y = 40.0\nEB0C = 11.0\n"),
-        "dvf5000_second": lambda: load_scene("dvf5000_second"),
-        "printer": lambda: parse_scene(
-            'title = "p"\nmachine = "printer_3d"\n[errors]\nEC0Y = 500\nEAX = { ramp = 30 }\n', "p"
-        ),
-    }[machine]()
+        "bent": _scene("EXX = { poly = [0, 0.1, 1e-4] }\nEC0Y = 40.0\nEB0C = 11.0\n"),
+        "dvf5000_second": load_scene("dvf5000_second"),
+        "printer": parse_scene(printer, "p"),
+    }[machine]
     grid = build_grid(scene.model, scene.workspace)
     scene = with_placement(scene, "relative")
     view = choose_view(scene, "relative")
@@ -261,18 +256,14 @@ def test_a_reference_point_is_held_still_after_the_fit():
     loose, still = (evaluate(scene, at=at, loop="relative", placed=True) for scene in (free, bound))
     assert np.allclose(still.error_um, loose.error_um - loose.error_um[0])
     view = choose_view(with_placement(bound, "relative"), "relative")
-    placement = find_placement(bound.model, bound.errors, view)
-    assert placement is not None
-    assert np.abs(placement).max() > 1.0
+    assert np.abs(find_placement(bound.model, bound.errors, view)).max() > 1.0
 
 
 def test_a_volume_along_one_axis_tells_fewer_numbers():
     scene = _scene("EXX = { poly = [3.0, 0.1] }\nEYX = { poly = [1.0, 0.2, 1e-3] }\n")
     flat = scene.workspace.moved({"Y": 0.0, "Z": -200.0})
     view = View(Loop.RELATIVE, placed_over=flat)
-    placement = find_placement(scene.model, scene.errors, view)
-    assert placement is not None
-    assert np.abs(placement).max() < 1000.0
+    assert np.abs(find_placement(scene.model, scene.errors, view)).max() < 1000.0
 
 
 @pytest.fixture(scope="module")
@@ -291,13 +282,17 @@ def test_slice_is_a_plane_of_nodes_at_its_position(scene, axis):
     assert len(outer_faces(grid.shape)) == 1
 
 
-def test_slice_outside_the_volume_is_refused(scene):
-    with pytest.raises(OptionError, match="X = 300 mm; expected -275 to 275 mm"):
-        build_slice(scene.model, scene.workspace, "X", 300.0)
-    with pytest.raises(OptionError):
-        build_slice(scene.model, scene.workspace, "X", float("nan"))
-    with pytest.raises(UnknownNameError):
-        build_slice(scene.model, scene.workspace, "B", 0.0)
+@pytest.mark.parametrize(
+    ("axis", "position", "kind", "said"),
+    [
+        ("X", 300.0, OptionError, "X = 300 mm; expected -275 to 275 mm"),
+        ("X", float("nan"), OptionError, "X = nan mm"),
+        ("B", 0.0, UnknownNameError, "axis of a slice"),
+    ],
+)
+def test_slice_outside_the_volume_is_refused(scene, axis, position, kind, said):
+    with pytest.raises(kind, match=said):
+        build_slice(scene.model, scene.workspace, axis, position)
 
 
 @pytest.mark.parametrize("chain", ["wXYFZt", "wYFXZt", "wCXFZYt"])

@@ -1,6 +1,7 @@
 """Compensation: what is written is read back, evaluated as the controller does, and applied."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -20,9 +21,10 @@ from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.simple import Directional
 from warpspace.machine.errors import ErrorSet, Harmonics, Poly, TableCurve
 from warpspace.scene.library import load_scene, parse_scene
-from warpspace.scene.model import evaluate
+from warpspace.scene.model import evaluate, with_direction
 
 
+@cache
 def scene_with(errors):
     return parse_scene(
         'machine = "dvf5000"\n[workspace]\nX = [-275, 275]\nY = [-225, 225]\nZ = [-480, -80]\n'
@@ -36,10 +38,8 @@ def corrected(scene, name, points=None, nodes=9, **plan):
 
 
 def sources_of(found):
-    ending = found.format.endings[0]
-    return [
-        source_of_text(text, f"compensation{add or ending}") for add, text in found.files.items()
-    ]
+    files, ending = found.files.items(), found.format.endings[0]
+    return [source_of_text(text, f"compensation{add or ending}") for add, text in files]
 
 
 def read_back(found, scene):
@@ -63,7 +63,7 @@ def largest_difference_um(one, other, grid=5, loop="tool"):
 @pytest.mark.parametrize("name", WRITTEN)
 def test_each_format_recognises_its_own_file_and_reads_it(name):
     scene = load_scene("dvf5000_first")
-    found = corrected(scene, name, 5 if name not in ("marlin", "klipper") else None)
+    found = corrected(scene, name, 5 if WRITTEN[name].has_grid else None)
     assert recognise(sources_of(found)).name == name
     assert found.after_statistics.rms_um < found.before_statistics.rms_um
     read_back(found, scene)
@@ -89,10 +89,9 @@ def test_positioning_errors_come_back_from_their_tables(name):
     scene = scene_with("EXX = { table = [[-275, 1], [0, -2], [275, 4]] }\nEZZ = { ramp = 6 }")
     back = read_back(corrected(scene, name, 3), scene)
     for key, at in (("EXX", np.linspace(-275, 275, 12)), ("EZZ", np.linspace(-480, -80, 5))):
-        expected = scene.errors.evaluate(key, at)
-        # heidenhain prints 0.0001 mm
-        near = 0.06 if name == "heidenhain" else 1e-3
-        assert back.errors.evaluate(key, at) == pytest.approx(expected, abs=near)
+        near = 0.06 if name == "heidenhain" else 1e-3  # it prints 0.0001 mm
+        expected = pytest.approx(scene.errors.evaluate(key, at), abs=near)
+        assert back.errors.evaluate(key, at) == expected
 
 
 def test_cross_tables_correct_an_angle_with_its_lever_by_a_product():
@@ -112,12 +111,11 @@ def test_a_full_grid_leaves_the_square_of_its_pitch(monkeypatch):
         "EXX = { harmonics = [[1, 20, 0]] }\nEYY = { harmonics = [[1, 15, 40]] }"
         "\nEAZ = { ramp = 9 }"
     )
-    left = [
+    left = np.array([
         corrected(scene, "fanuc-3d", points, 32, resolution=1e-6).after_statistics.rms_um
         for points in (5, 9, 17)
-    ]
-    assert left[0] / left[1] == pytest.approx(4.0, rel=0.1)
-    assert left[1] / left[2] == pytest.approx(4.0, rel=0.1)
+    ])  # fmt: skip
+    assert left[:-1] / left[1:] == pytest.approx([4.0, 4.0], rel=0.1)
     # and comes back as errors of two axes
     scene = scene_with("EXX = { ramp = 30 }\nEAY = { ramp = 40 }\nEC0Y = 50")
     back = read_back(corrected(scene, "fanuc-3d", 5, resolution=1e-5), scene)
@@ -149,19 +147,18 @@ def test_matrix_and_skew_correct_squareness_about_a_point_held_still(name):
         assert back.errors.amplitude(key) == pytest.approx(base.errors.amplitude(key), abs=1.0)
 
 
-@pytest.mark.parametrize("sign", ["error", "correction"])
 @pytest.mark.parametrize("name", ["sinumerik-enc", "sinumerik-cec", "heidenhain", "fanuc-3d"])
-def test_the_other_sign_is_written_read_and_leaves_the_same(name, sign):
+def test_either_sign_is_written_read_and_leaves_the_same(name):
     scene = scene_with("EXX = { ramp = 30 }\nEAY = { ramp = 40 }")
-    usual = corrected(scene, name, 3).after_statistics.max_um
-    other = corrected(scene, name, 3, sign=sign).after_statistics.max_um
-    assert other == pytest.approx(usual, abs=1e-4)
+    found = [corrected(scene, name, 3, 5, sign=sign) for sign in (None, "error", "correction")]
+    usual, *signed = (one.after_statistics.max_um for one in found)
+    assert signed == pytest.approx([usual, usual], abs=1e-4)
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["c_frame_mill", "gantry_mill", "head_head_cb", "printer_3d", "table_head_bc", "trunnion_bc"],
-)
+MACHINES = "c_frame_mill gantry_mill head_head_cb printer_3d table_head_bc trunnion_bc"
+
+
+@pytest.mark.parametrize("name", MACHINES.split())
 def test_axes_on_either_side_are_moved_the_right_way(name):
     scene = load_scene(f"machine_{name}")
     corrector = build_corrector(scene, "relative")
@@ -264,14 +261,10 @@ def test_a_machine_without_errors_has_nothing_to_correct(form, name):
 @pytest.mark.parametrize(
     ("name", "asked", "left_um"),
     [
-        ("klipper", False, 0.1),
-        ("marlin", False, 0.1),
-        ("linuxcnc-matrix", False, 0.01),
-        ("sinumerik-cec", True, 0.01),
-        ("heidenhain", True, 0.2),
-        ("fanuc-3d", True, 1.0),
+        ("klipper", False, 0.1), ("marlin", False, 0.1), ("linuxcnc-matrix", False, 0.01),
+        ("sinumerik-cec", True, 0.01), ("heidenhain", True, 0.2), ("fanuc-3d", True, 1.0),
     ],
-)
+)  # fmt: skip
 def test_a_part_on_a_moving_bed_is_corrected_where_it_has_its_shape(name, asked, left_um):
     text = 'title = "p"\nmachine = "printer_3d"\n[errors]\nEC0Y = 1000\n'
     scene = replace(parse_scene(text, "p"), placed=asked)
@@ -295,24 +288,20 @@ ONE_HELD = BOTH_HELD | {"linuxcnc-comp", "heidenhain"}
 """Formats that hold that of a positioning error alone."""
 
 
-def table(scene, name):
-    points = None if WRITTEN[name].grid.startswith("none") else 3
+@cache
+def table(errors, name, direction="mean"):
+    scene = with_direction(scene_with(errors), direction)
+    points = 3 if WRITTEN[name].has_grid else None
     return corrected(scene, name, points, 5)  # what they hold here is linear
-
-
-def looking(scene, direction):
-    return replace(scene, model=replace(scene.model, direction=direction))
 
 
 @pytest.mark.parametrize("errors", [POSITIONING, ROLL])
 @pytest.mark.parametrize("name", WRITTEN)
 def test_every_format_holds_the_directions_or_says_that_it_does_not(name, errors):
-    found = table(scene_with(errors), name)
+    found = table(errors, name)
     there, back = found.directions["forward"], found.directions["backward"]
-    reversal = [
-        float(np.linalg.norm(one.error_um - other.error_um, axis=-1).max())
-        for one, other in ((there.before, back.before), (there.after, back.after))
-    ]
+    pairs = (there.before, back.before), (there.after, back.after)
+    reversal = [float((forward - backward).norm_um.max()) for forward, backward in pairs]
     assert reversal[0] > 5.0
     said = [note for note in found.notes if "direction of travel" in note]
     if name in (ONE_HELD if errors == POSITIONING else BOTH_HELD):
@@ -332,10 +321,10 @@ def test_every_format_holds_the_directions_or_says_that_it_does_not(name, errors
 
 @pytest.mark.parametrize("name", ["sinumerik-cec", "csv"])
 def test_what_is_before_and_after_is_that_of_the_direction_looked_at(name):
-    scene = scene_with(f"{POSITIONING}\n{ROLL}")
-    files = table(scene, name).files
+    errors = f"{POSITIONING}\n{ROLL}"
+    files = table(errors, name).files
     for way in TravelDirection:
-        found = table(looking(scene, way), name)
+        found = table(errors, name, way)
         assert found.files == files, way
         assert found.after_statistics.max_um < 0.02, way
         if way in found.directions:
@@ -344,9 +333,8 @@ def test_what_is_before_and_after_is_that_of_the_direction_looked_at(name):
 
 @pytest.mark.parametrize("name", ["sinumerik-enc", "iso-text", "isg-csv", "fanuc-3d"])
 def test_one_value_for_both_directions_is_that_of_the_scene(name):
-    scene = scene_with(POSITIONING)
     for way in ("mean", "forward", "backward"):
-        found = table(looking(scene, way), name)
+        found = table(POSITIONING, name, way)
         assert found.after_statistics.max_um < 0.9, way
         other = "forward" if way == "backward" else "backward"
         assert found.directions[other].after_statistics.rms_um > 3.0
@@ -357,31 +345,28 @@ def test_one_value_for_both_directions_is_that_of_the_scene(name):
     [("sinumerik-cec", 1e-3), ("heidenhain", 0.06), ("linuxcnc-comp", 1e-3), ("csv", 1e-6)],
 )
 def test_a_reversal_comes_back_from_its_table(name, near_um):
-    scene = scene_with(POSITIONING)
-    found = table(scene, name)
-    curve = read_back(found, scene).errors.functions["EXX"]
+    curve = read_back(table(POSITIONING, name), scene_with(POSITIONING)).errors.functions["EXX"]
     assert isinstance(curve, Directional)
     at = np.array([0.0, 100.0])
     assert curve.forward.evaluate(at) == pytest.approx([4.0, 5.0], abs=near_um)
     assert curve.backward.evaluate(at) == pytest.approx([-4.0, -3.0], abs=near_um)
     for way in ("forward", "backward", "mean"):
-        left = table(looking(scene, way), name).after_statistics
+        left = table(POSITIONING, name, way).after_statistics
         assert left.max_um < 0.002 + 2.0 * near_um, way
 
 
 def test_cross_tables_are_of_one_direction_and_backlash_of_one_axis():
-    text = table(scene_with(POSITIONING), "sinumerik-cec").files[""]
+    text = table(POSITIONING, "sinumerik-cec").files[""]
     assert "$AN_CEC_DIRECTION[0]=1\n" in text
     assert "$AN_CEC_DIRECTION[1]=-1\n" in text
     roll = scene_with(ROLL)
-    back = read_back(table(roll, "sinumerik-cec"), roll)
+    back = read_back(table(ROLL, "sinumerik-cec"), roll)
     for way in ("forward", "backward"):
-        there, here = (evaluate(looking(one, way), grid=5).error_um for one in (roll, back))
-        assert np.abs(there - here).max() < 0.02
-    files = table(scene_with(POSITIONING), "heidenhain").files
+        assert largest_difference_um(with_direction(roll, way), with_direction(back, way)) < 0.02
+    files = table(POSITIONING, "heidenhain").files
     assert files["_X.COM"].splitlines()[1].split() == ["NR", "AXISPOS", "BACKLASH", "X"]
     assert "BACKLASH" not in files["_Y.COM"]
-    both = table(scene_with(f"{POSITIONING}\nEYX = {{ ramp = 5 }}"), "heidenhain")
+    both = table(f"{POSITIONING}\nEYX = {{ ramp = 5 }}", "heidenhain")
     assert "BACKLASH" not in both.files["_X.COM"]
     assert any("direction of travel" in note for note in both.notes)
 

@@ -1,6 +1,7 @@
 """Error sets in other conventions: closed forms, the same exact field, and the way back."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -72,10 +73,8 @@ EXB = 3
 
 def scene_of(order, direction):
     scene = parse_scene(TEXT.replace("ORDER", order), "s")
-    axes = {
-        name: replace(axis, direction=direction if name in "XC" else 1)
-        for name, axis in scene.machine.axes.items()
-    }
+    axes = scene.machine.axes
+    axes = {**axes, **{name: replace(axes[name], direction=direction) for name in "XC"}}
     machine = replace(scene.machine, axes=axes)
     return replace(scene, model=replace(scene.model, machine=machine))
 
@@ -85,7 +84,7 @@ def scene(request):
     return scene_of(*request.param)
 
 
-def assert_same_field(one, model, errors, tolerance=SAME):
+def assert_same_field(one, model, errors):
     random = np.random.default_rng(7)
     spans = covered_spans(one.model, one.workspace)
     at = {axis: random.uniform(*span, 150) for axis, span in spans.items()}
@@ -95,20 +94,16 @@ def assert_same_field(one, model, errors, tolerance=SAME):
         for loop in ("tool", "workpiece", "relative"):
             a, b = (evaluate(each, at=at, loop=loop, exact=True) for each in pair)
             assert np.abs(a.error_um).max() > 10.0
-            np.testing.assert_allclose(b.error_um, a.error_um, rtol=0, atol=tolerance)
-            np.testing.assert_allclose(
-                b.orientation_urad, a.orientation_urad, rtol=0, atol=tolerance
-            )
+            fields = ((each.error_um, each.orientation_urad) for each in (b, a))
+            np.testing.assert_allclose(*fields, rtol=0, atol=SAME)
 
 
 def assert_same_curves(one, other, spans):
     for key in {*one, *other}:
-        axis = key[-1]
-        at = {axis: np.linspace(*spans[axis], 333)}
+        at = {key[-1]: np.linspace(*spans[key[-1]], 333)}
         for way in ("forward", "backward"):
-            expected = one.evaluate_at(key, at, way)
-            found = other.evaluate_at(key, at, way)
-            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10, err_msg=key)
+            values = (errors.evaluate_at(key, at, way) for errors in (other, one))
+            np.testing.assert_allclose(*values, rtol=0, atol=1e-10, err_msg=key)
 
 
 def spans_of(scene):
@@ -136,8 +131,8 @@ def test_fits_give_the_simplest_curve_that_is_exact():
 def test_pieces_are_held_beyond_their_ends_and_reload():
     text = "EXX = { pieces = [[0, 1, 2], [10, 21, -1]], end = 20, points = [5] }"
     curve = parse_scene(f'machine = "dvf5000"\n[errors]\n{text}\n', "s").errors.functions["EXX"]
-    found = curve.evaluate(np.array([-5.0, 0.0, 5.0, 10.0, 15.0, 20.0, 99.0]))
-    assert found.tolist() == [1.0, 1.0, 11.0, 21.0, 16.0, 11.0, 11.0]
+    values = curve.evaluate(np.array([-5.0, 0.0, 5.0, 10.0, 15.0, 20.0, 99.0]))
+    assert values.tolist() == [1.0, 1.0, 11.0, 21.0, 16.0, 11.0, 11.0]
     rows = [[0.0, 1.0, 2.0], [10.0, 21.0, -1.0]]
     assert curve.to_toml() == {"pieces": rows, "end": 20.0, "points": [5.0]}
 
@@ -193,12 +188,11 @@ def test_the_line_shows_what_a_reflector_there_would_move_by(scene):
 
 def test_what_is_zero_at_a_position_was_moved_to_the_constants(scene):
     spans = spans_of(scene)
-    wanted = {"X": 10.0, "Z": -100.0, "C": 30.0}
-    errors = zero_at(scene.model, scene.errors, spans, wanted)
-    for axis, position in wanted.items():
-        for letter in "XYZABC":
-            value = float(errors.evaluate(f"E{letter}{axis}", np.array(position)))
-            assert value == pytest.approx(0.0, abs=1e-9)
+    positions = {"X": 10.0, "Z": -100.0, "C": 30.0}
+    errors = zero_at(scene.model, scene.errors, spans, positions)
+    for axis, at in positions.items():
+        values = [errors.evaluate(f"E{letter}{axis}", np.array(at)) for letter in "XYZABC"]
+        np.testing.assert_allclose(values, 0.0, atol=1e-9)
     assert_same_field(scene, scene.model, errors)
 
 
@@ -292,9 +286,8 @@ def test_the_sign_is_that_of_the_angle_between_the_axes(key):
 
 def test_signs_of_the_reference_machine_and_back():
     machine = build_machine("wCBFXYZt")
-    errors = ErrorSet(
-        {key: Constant((0.0, 1.0), 7.0) for key in ("EC0Y", "EA0Z", "EB0Z", "EA0C", "EAX")}
-    )
+    keys = ("EC0Y", "EA0Z", "EB0Z", "EA0C", "EAX")
+    errors = ErrorSet(dict.fromkeys(keys, Constant((0.0, 1.0), 7.0)))
     over = convert_squareness(machine, errors, "over_90")
     assert [over.amplitude(key) for key in errors] == [7.0, 7.0, -7.0, 7.0, 7.0]
     under = convert_squareness(machine, errors, "under_90")
@@ -304,22 +297,18 @@ def test_signs_of_the_reference_machine_and_back():
         assert convert_squareness(machine, there, sign) == errors
 
 
+LINE = (0.0, 0.0, 100.0)
 SURFACE = TwoArguments(
     (-275.0, 275.0), ("X", "Z"), ((-275.0, 275.0), (-480.0, -80.0)), ((0.0, 4.0), (3.0, 9.0))
 )
 
 
 def test_shifts_over_two_axes_stay_where_nothing_is_added_to_them():
-    scene = parse_scene('machine = "dvf5000"\n[errors]\nEAX = 5\nEBZ = 3\n', "s")
+    scene = parse_scene('machine = "dvf5000"\n[errors]\nEAX = 90\nEBZ = 3\nEXC = 12\n', "s")
     errors = ErrorSet({**scene.errors.functions, "EXX": SURFACE})
     model, found = convert_order(scene.model, errors, spans_of(scene), {"X": "before_motion"})
     assert found.functions["EXX"] == SURFACE
-    both = replace(scene, errors=errors)
-    random = np.random.default_rng(1)
-    at = {axis: random.uniform(*span, 50) for axis, span in spans_of(scene).items()}
-    a = evaluate(both, at=at, exact=True).error_um
-    b = evaluate(replace(both, model=model, errors=found), at=at, exact=True).error_um
-    np.testing.assert_allclose(b, a, rtol=0, atol=SAME)
+    assert_same_field(replace(scene, errors=errors), model, found)
 
 
 @pytest.mark.parametrize("key", ["EXX", "EBX"])
@@ -327,11 +316,9 @@ def test_what_depends_on_a_second_axis_and_would_change_is_refused(key):
     scene = parse_scene('machine = "dvf5000"\n[errors]\nEBX = 5\n', "s")
     errors = ErrorSet({**scene.errors.functions, key: SURFACE})
     spans = spans_of(scene)
-    with pytest.raises(OptionError, match=f"{key} depends on X and Z"):
-        zero_at(scene.model, errors, spans, {"X": 0.0})
-    line = {"X": (0.0, 0.0, 100.0)}
-    with pytest.raises(OptionError, match=f"{key} depends on X and Z"):
-        move_measuring_line(scene.model, errors, spans, line, to_origin=False)
+    for convert, value in ((zero_at, 0.0), (partial(move_measuring_line, to_origin=False), LINE)):
+        with pytest.raises(OptionError, match=f"{key} depends on X and Z"):
+            convert(scene.model, errors, spans, {"X": value})
 
 
 def test_both_directions_are_converted_and_stay_two():
@@ -339,7 +326,7 @@ def test_both_directions_are_converted_and_stay_two():
     model = Model(build_machine("wFXt"))
     pitch = Directional(span, Constant(span, 10.0), Harmonics(span, ((1.0, 4.0, 0.0),)))
     errors = move_measuring_line(
-        model, ErrorSet({"EBX": pitch}), {"X": span}, {"X": (0.0, 0.0, 100.0)}, to_origin=False
+        model, ErrorSet({"EBX": pitch}), {"X": span}, {"X": LINE}, to_origin=False
     )
     at = {"X": np.array([0.0, 60.0])}
     assert errors.functions["EBX"] == pitch

@@ -152,12 +152,9 @@ def test_the_command_keeps_what_it_reads(tmp_path: Path):
 
 
 def test_holes_and_turns_are_written_out(dvf: Scene):
-    lines = [
-        "G90 G0 X0 Y0 Z-200",
-        "G99 G81 X9 Z-220 R-205 K1",
-        "G80",
-        "G17 G3 X9 I-5 Z-190 P2",
-    ]
+    lines = (
+        "G90 G0 X0 Y0 Z-200\nG99 G81 X9 Z-220 R-205 K1\nG80\nG17 G3 X9 I-5 Z-190 P2".splitlines()
+    )
     found = correct(dvf, lines)
     assert not [line for line in found if re.search("[IJKLPR]", line) and "(" not in line]
     wanted, path = (trace(dvf, some) for some in (lines, found))

@@ -2,6 +2,8 @@
 the bench and their own budgets.
 """
 
+import re
+
 import numpy as np
 import pytest
 import trimesh
@@ -252,9 +254,8 @@ def test_budgets_close(name, place, mesh):
             whole = row[f"placed_difference_{unit}"]
             assert sum(row["budget"].values()) == pytest.approx(whole, rel=0.01, abs=0.01)
         assert feature.budget == feature.measures[feature.budget_of]["budget"]
-    assert len(features_table([*found.values()]).rows) == sum(
-        len(f.measures) for f in found.values()
-    )
+    count = sum(len(feature.measures) for feature in found.values())
+    assert len(features_table([*found.values()]).rows) == count
 
 
 def test_a_plate_of_holes_is_the_ball_plate_of_the_bench():
@@ -288,7 +289,5 @@ def test_a_plate_of_holes_is_the_ball_plate_of_the_bench():
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_tolerances_is_said(toml, said):
-    with pytest.raises(SceneError) as refused:
+    with pytest.raises(SceneError, match=rf"(?s)tolerances\.toml.*{re.escape(said)}"):
         inspected(scene_with(), CUBE, toml)
-    assert said in str(refused.value)
-    assert "tolerances.toml" in str(refused.value)

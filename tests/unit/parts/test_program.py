@@ -23,21 +23,16 @@ from warpspace.parts.program import Program, ToolPath, trace_program
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene, evaluate
 
-HEAD = """
+TRAVEL = "X = [-900, 900]\nY = [-900, 900]\nZ = [-900, 900]"
+HEAD = f"""
 title = "head"
 [machine]
 chain = "wXYFZCBt"
-[machine.direction]
-X = -1
-Y = -1
+direction = {{ X = -1, Y = -1 }}
 [machine.travel]
-X = [-900, 900]
-Y = [-900, 900]
-Z = [-900, 900]
+{TRAVEL}
 [workspace]
-X = [-900, 900]
-Y = [-900, 900]
-Z = [-900, 900]
+{TRAVEL}
 B = 0
 C = 0
 """
@@ -117,10 +112,8 @@ def test_a_thousand_arcs_are_circles(dvf: Scene):
         if number % 2:
             words += f" R{radius if turn < np.pi else -radius:.10f}"
         else:
-            centre = dict(
-                zip(axes, -radius * np.array([np.cos(start), np.sin(start)]), strict=False)
-            )
-            words += "".join(f" {'IJK'['XYZ'.index(x)]}{v:.10f}" for x, v in centre.items())
+            centre = zip(axes, (-radius * np.cos(start), -radius * np.sin(start)), strict=False)
+            words += "".join(f" {'IJK'['XYZ'.index(x)]}{v:.10f}" for x, v in centre)
         text.append(f"{plane} G{3 if sense > 0 else 2} {words}")
         expected.append(([*map("XYZ".index, axes)], radius, place))
     _, path = run(dvf, "\n".join(text))
@@ -182,9 +175,8 @@ def test_holes(dvf: Scene):
 
 def test_json_holds_together(dvf: Scene, tmp_path: Path):
     file = tmp_path / "x.ngc"
-    file.write_text(
-        "G43 H1 G0 X-50 Y-50 Z-300\nG1 X50\nY50\nX-50\nY-50\nG2 I50 J50\nG1 B-10 Z0\n#1=2"
-    )
+    text = "G43 H1 G0 X-50 Y-50 Z-300\nG1 X50\nY50\nX-50\nY-50\nG2 I50 J50\nG1 B-10 Z0\n#1=2"
+    file.write_text(text)
     found = verb("program")(dvf, file=str(file), length_mm=75.0, at_line=7)
     said = found.as_json()
     assert said["blocks"] == 7

@@ -20,12 +20,8 @@ from warpspace.picture.traces import (
 from warpspace.scene.library import load_scene, parse_scene
 
 TOOL_SIDE = """
-[machine]
-chain = "wFXYZACt"
-[workspace]
-X = [0, 300]
-Y = [0, 200]
-Z = [0, 100]
+machine.chain = "wFXYZACt"
+workspace = { X = [0, 300], Y = [0, 200], Z = [0, 100] }
 [points_mm]
 traces = [[120, 40, -60]]
 [errors]
@@ -86,8 +82,7 @@ def test_location_errors_displace_and_incline_the_axis(error, displaced_um, incl
     motion = evaluate_axis_motion(scene, line)
     found = motion.radial.once_a_turn, motion.tilt.once_a_turn
     assert found == pytest.approx((displaced_um, inclined_urad), abs=1e-9)
-    values = [one.motion_value for one in motion.motions]
-    assert values == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+    assert [one.motion_value for one in motion.motions] == pytest.approx([0.0] * 3, abs=1e-9)
 
 
 def test_point_on_the_axis_has_no_motion():
@@ -101,12 +96,7 @@ def test_point_on_the_axis_has_no_motion():
     assert evaluate_axis_motion(scene, line) is None
 
 
-MIXED = """
-title = "mixed"
-machine = "dvf5000"
-[convention]
-component_errors = { rotary = "before_motion" }
-"""
+MIXED = 'machine = "dvf5000"\nconvention.component_errors = { rotary = "before_motion" }\n'
 
 
 def test_all_conventions_are_named_with_their_axes():
@@ -136,12 +126,8 @@ def test_all_conventions_are_named_with_their_axes():
 @pytest.mark.parametrize(
     ("name", "size_mm"),
     [
-        ("wFXt", 500.0),
-        ("only Y moves", 300.0),
-        ("wCFt, traces", 2.0 * (200.0**2 + 50.0**2) ** 0.5),
-        ("wCFt", 100.0),
-        ("wFt, one still axis", 500.0),
-        ("nothing moves", 500.0),
+        *[(name, 500.0) for name in ("wFXt", "wFt, one still axis", "nothing moves")],
+        *[("only Y moves", 300.0), ("wCFt, traces", 2.0 * np.hypot(200.0, 50.0)), ("wCFt", 100.0)],
     ],
 )
 def test_size_of_a_line_and_of_a_point(name, size_mm):
@@ -153,8 +139,7 @@ def test_size_of_a_line_and_of_a_point(name, size_mm):
 
 
 def test_its_statistics_are_of_what_it_colours():
-    plan = Concepts(samples=200)
-    (concept,) = compare_concepts([load_scene("dvf5000_first")], plan)
+    (concept,) = compare_concepts([load_scene("dvf5000_first")], Concepts(samples=200))
     picture = picture_concept(concept, 5)
     found, values = picture.statistics, picture.values
     assert found.max_um == pytest.approx(values.max())

@@ -9,16 +9,7 @@ from warpspace.analysis.commands.convert import Target, convert_scene, field_dif
 from warpspace.exceptions import SceneError, WarpspaceError
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import ComponentErrors
-from warpspace.machine.errors import (
-    Constant,
-    Harmonics,
-    Measurement,
-    Poly,
-    Ramp,
-    TableCurve,
-    Tolerance,
-    TravelRun,
-)
+from warpspace.machine import errors
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.model import evaluate
 from warpspace.scene.scene_writer import Notation, scene_to_toml
@@ -48,12 +39,12 @@ def test_every_kind_of_error_function_is_built(tmp_path):
     )
     functions = parse_scene(text, "all", folder=tmp_path).errors.functions
     travel, turn = (-275.0, 275.0), (0.0, 360.0)
-    assert functions["EXX"] == Constant(travel, 3.0)
-    assert functions["EAZ"] == Ramp((-480.0, -80.0), -22.5)
-    assert functions["EYX"] == Poly(travel, (0, 0.02))
-    assert functions["EXC"] == Harmonics(turn, ((1, 3, 90),))
-    assert functions["EZX"] == TableCurve(travel, ((-275, 0), (275, 4.1)))
-    assert functions["EBX"] == TableCurve(travel, ((-275.0, -4.0), (275.0, 6.0)))
+    assert functions["EXX"] == errors.Constant(travel, 3.0)
+    assert functions["EAZ"] == errors.Ramp((-480.0, -80.0), -22.5)
+    assert functions["EYX"] == errors.Poly(travel, (0, 0.02))
+    assert functions["EXC"] == errors.Harmonics(turn, ((1, 3, 90),))
+    assert functions["EZX"] == errors.TableCurve(travel, ((-275, 0), (275, 4.1)))
+    assert functions["EBX"] == errors.TableCurve(travel, ((-275.0, -4.0), (275.0, 6.0)))
 
 
 def test_ramp_runs_over_the_travel_where_the_axis_stands_still():
@@ -78,7 +69,10 @@ def test_constant_beyond_the_default_ones_becomes_a_parameter_of_the_scene():
 def test_tolerances_are_a_half_width_or_a_range():
     text = DVF + "[tolerances]\ndefault = { rotation = 20 }\nEXB = 5\nEAX = { centre = -8, "
     tolerances = parse_scene(text + "half_width = 6 }\n", "x").tolerances
-    assert tolerances.individual == {"EXB": Tolerance(0.0, 5.0), "EAX": Tolerance(-8.0, 6.0)}
+    assert tolerances.individual == {
+        "EXB": errors.Tolerance(0.0, 5.0),
+        "EAX": errors.Tolerance(-8.0, 6.0),
+    }
     assert tolerances.default == {"rotation": 20.0}
 
 
@@ -178,8 +172,10 @@ runs = [
 
 def test_they_are_read_and_reload_equal():
     scene = parse_scene(MEASURED, "s")
-    assert scene.uncertainty["EXX"] == Constant((-275.0, 275.0), 0.4)
-    assert scene.uncertainty["EYX"] == TableCurve((-275.0, 275.0), ((-275.0, 0.1), (275.0, 0.2)))
+    assert scene.uncertainty["EXX"] == errors.Constant((-275.0, 275.0), 0.4)
+    assert scene.uncertainty["EYX"] == errors.TableCurve(
+        (-275.0, 275.0), ((-275.0, 0.1), (275.0, 0.2))
+    )
     runs = scene.measured["EXX"].runs
     assert [run.direction for run in runs] == ["+", "-", ""]
     assert runs[1].points == ((275.0, 1.5), (-275.0, 2.5))
@@ -188,11 +184,11 @@ def test_they_are_read_and_reload_equal():
 
 def test_readings_come_by_direction():
     runs = (
-        TravelRun("+", ((0.0, 1.0),)),
-        TravelRun("-", ((0.0, 2.0),)),
-        TravelRun("+", ((5.0, 3.0),)),
+        errors.TravelRun("+", ((0.0, 1.0),)),
+        errors.TravelRun("-", ((0.0, 2.0),)),
+        errors.TravelRun("+", ((5.0, 3.0),)),
     )
-    measurement = Measurement(runs)
+    measurement = errors.Measurement(runs)
     assert measurement.count == 3
     np.testing.assert_array_equal(measurement.scatter["+"], [[0.0, 1.0], [5.0, 3.0]])
     np.testing.assert_array_equal(measurement.scatter["-"], [[0.0, 2.0]])
@@ -206,9 +202,9 @@ def test_readings_may_stand_in_a_file_beside_the_scene(tmp_path):
     (tmp_path / "s.toml").write_text(text)
     scene = load_scene(tmp_path / "s.toml")
     assert scene.measured["EXX"].runs == (
-        TravelRun("+", ((-275.0, 1.0), (275.0, 2.0))),
-        TravelRun("-", ((275.0, 1.5),)),
-        TravelRun("-", ((-275.0, 2.5),)),
+        errors.TravelRun("+", ((-275.0, 1.0), (275.0, 2.0))),
+        errors.TravelRun("-", ((275.0, 1.5),)),
+        errors.TravelRun("-", ((-275.0, 2.5),)),
     )
     assert parse_scene(scene_to_toml(scene), "s") == scene  # needs no other file
 

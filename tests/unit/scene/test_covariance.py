@@ -154,15 +154,16 @@ def packed(path, **files):
             pack.writestr(f"{name}.npy", content)
 
 
-def plain_bytes(path):
-    packed(path, keys=b"hello", matrix=b"world")
+def array_header(**changes):
+    head = BytesIO()
+    usual = {"descr": "<f8", "fortran_order": False, "shape": (2, 2)}
+    np.lib.format.write_array_header_1_0(head, usual | changes)
+    return head.getvalue()
 
 
 def enormous(path):
-    head = BytesIO()
-    shape = {"descr": "<f8", "fortran_order": False, "shape": (10**6, 10**6)}
-    np.lib.format.write_array_header_1_0(head, shape)
-    packed(path, keys=head.getvalue(), matrix=head.getvalue())
+    head = array_header(shape=(10**6, 10**6))
+    packed(path, keys=head, matrix=head)
 
 
 def damaged(path):
@@ -186,49 +187,31 @@ def locked(path):
 
 
 def header(path, **changes):
-    head = BytesIO()
-    usual = {"descr": "<f8", "fortran_order": False, "shape": (2, 2)}
-    np.lib.format.write_array_header_1_0(head, usual | changes)
     keys = BytesIO()
     np.save(keys, np.array(["EC0Y", "EA0Z"]))
-    packed(path, keys=keys.getvalue(), matrix=head.getvalue() + np.eye(2).tobytes())
+    packed(path, keys=keys.getvalue(), matrix=array_header(**changes) + np.eye(2).tobytes())
 
 
-def without_bytes(path):
-    header(path, descr="|V0", shape=(10**7,))
-
-
-def entries_without_bytes(path):
-    header(path, descr="|V0")
-
-
-def texts(path):
-    header(path, descr="<U2")
-
-
-def deep_header(path):
-    text = b"[" * 9000
+def raw_header(path, text):
     text = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
     packed(path, keys=text, matrix=text)
 
 
-def unfinished_header(path):
-    text = b"{'descr': '<f8', 'shape': (2, 2"
-    text = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
-    packed(path, keys=text, matrix=text)
+UNREADABLE = {
+    "plain bytes": lambda path: packed(path, keys=b"hello", matrix=b"world"),
+    "enormous": enormous,
+    "damaged": damaged,
+    "locked": locked,
+    "without bytes": lambda path: header(path, descr="|V0", shape=(10**7,)),
+    "entries without bytes": lambda path: header(path, descr="|V0"),
+    "texts": lambda path: header(path, descr="<U2"),
+    "deep header": lambda path: raw_header(path, b"[" * 9000),
+    "unfinished header": lambda path: raw_header(path, b"{'descr': '<f8', 'shape': (2, 2"),
+    "other arrays": lambda path: np.savez(path, keys=["EC0Y"], matrix=[[1.0]], more=np.zeros(10)),
+}
 
 
-def other_arrays(path):
-    np.savez(path, keys=np.array(["EC0Y"]), matrix=[[1.0]], more=np.zeros(10))
-
-
-@pytest.mark.parametrize(
-    "write",
-    [
-        *(plain_bytes, enormous, damaged, locked, without_bytes, entries_without_bytes, texts),
-        *(deep_header, unfinished_header, other_arrays),
-    ],
-)
+@pytest.mark.parametrize("write", UNREADABLE.values(), ids=UNREADABLE)
 def test_a_file_of_numpy_that_cannot_be_read_is_named(tmp_path, write):
     write(tmp_path / "c.npz")
     text = SCENE[: SCENE.index("[uncertainty.")] + '[uncertainty]\ncovariance = "c.npz"\n'

@@ -7,36 +7,24 @@ from typing import ClassVar
 
 import numpy as np
 
+from warpspace.analysis import description
 from warpspace.analysis.adjustment_search import Objective, Search, Volume
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
-from warpspace.analysis.description import (
-    Analysis,
-    Change,
-    ExpandedUncertainty,
-    ProgressCallback,
-    Result,
-    ignore_progress,
-)
 from warpspace.analysis.options import ALL, LOOP_HELP, LOOP_UNSET, PLACED_HELP, Keys, Limits, option
 from warpspace.analysis.statistics import Summary, volume_statistics
-from warpspace.analysis.uncertainty.propagation import (
-    FieldUncertainty,
-    field_uncertainty,
-    plus_minus,
-    scene_uncertainty,
-    u95_lines,
-)
+from warpspace.analysis.uncertainty import propagation
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorBasis, View, amplitudes_of, placed_words
-from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
+from warpspace.field.grid import DEFAULT_NODES, build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import Parameter, parameter
 from warpspace.machine.limits import MAX_ERROR, MAX_TEXT, MIN_HALF_WIDTH, REPAIR_COUNT, REPAIR_NODES
 from warpspace.scene.model import Scene, evaluate_grid, grid_basis, second_order, with_placement
-from warpspace.units import Array, spell, spell_short
+from warpspace.units import spell, spell_short
 
 DEFAULT_LIMIT = 200.0  # µm or µrad by which an error may be changed, unless somebody says otherwise
 MOST_BARS, MOST_VALUES = 14, 3  # errors in a chart, and values beside a bar
+OBJECTIVE_WORDS = {Objective.RMS: "RMS |E|", Objective.MAX: "largest |E|"}
 FOUR = ("mean_um", "rms_um", "p95_um", "max_um")
 
 
@@ -59,8 +47,8 @@ class Effect:
     present: float  # µm or µrad
     left_out: Summary
     best: Best
-    expanded_uncertainty: ExpandedUncertainty[float | None] = attribute(
-        default_factory=ExpandedUncertainty[float | None]
+    expanded_uncertainty: description.ExpandedUncertainty[float | None] = attribute(
+        default_factory=description.ExpandedUncertainty[float | None]
     )
 
     @property
@@ -81,11 +69,11 @@ class AdjustedSet(Summary):
     # whether all sets of this size were compared; else the set was built up and improved by
     # swapping its members
     proven: bool
-    exact: Summary | None  # by the exact chain
+    exact: Summary  # by the exact chain
 
 
 @dataclass(frozen=True, kw_only=True)
-class Adjust(Analysis):
+class Adjust(description.Analysis):
     """Find which errors of SCENE to adjust, and to what.
 
     For each error stands what leaving it out, and what its best value, gives for the whole volume
@@ -131,29 +119,49 @@ class Adjust(Analysis):
         high=REPAIR_NODES[1],
     )
 
-    def scene_and_view(self, scene: Scene) -> tuple[Scene, View]:
+    def run(
+        self, scene: Scene, watch: description.ProgressCallback = description.ignore_progress, /
+    ) -> "AdjustResult":
         scene = with_placement(scene, self.loop, placed=self.placed)
-        return scene, scene.view(self.loop)
-
-    def run(self, scene: Scene, watch: ProgressCallback = ignore_progress, /) -> "AdjustResult":
-        scene, view = self.scene_and_view(scene)
-        nodes = build_grid(scene.model, scene.workspace, self.grid)
-        basis = grid_basis(scene, nodes, view, self.included(scene))
-        values = amplitudes_of(scene.errors, basis.keys)
-        result = find_adjustments(basis, nodes, values, self, scene, watch)
-        exact = [
-            volume_statistics(evaluate_grid(change.scene, nodes, view, exact=True), nodes)
-            for change in result.changes()
-        ]
-        sets = [
-            replace(adjusted, exact=Summary(*numbers.four))
-            for adjusted, numbers in zip(result.adjustments, exact, strict=True)
-        ]
-        left_out = second_order(scene, view.loop)
-        result = replace(result, adjustments=tuple(sets), second_order=left_out)
-        error = basis.evaluate(values, orientation=False).error_um
-        at = nodes.coordinates, view, nodes.point_mm, nodes.weights
-        uncertainty = field_uncertainty(scene, error, *at)
+        view = scene.view(self.loop)
+        grid = build_grid(scene.model, scene.workspace, self.grid)
+        basis = grid_basis(scene, grid, view, self.included(scene))
+        amplitudes = amplitudes_of(scene.errors, basis.keys)
+        volume = Volume(basis, grid, amplitudes)
+        candidates = _candidates(volume, self)
+        limits = np.array([self.limit_of(key) for key in basis.keys])
+        low = np.maximum(-limits, -MAX_ERROR - amplitudes)
+        high = np.minimum(limits, MAX_ERROR - amplitudes)
+        bounds = np.column_stack([np.minimum(low, 0.0), np.maximum(high, 0.0)])
+        off = bool(np.any(volume.error_um))
+        sets: list[AdjustedSet] = []
+        search = Search(volume, self.objective, bounds)
+        for best, proven in search.best_sets(candidates if off else (), self.count):
+            values = amplitudes[list(best.indices)] + best.change
+            adjust = {basis.keys[i]: float(v) for i, v in zip(best.indices, values, strict=True)}
+            numbers = volume.statistics(volume.changed(best.indices, values))
+            adjusted = apply_adjustments(scene, adjust)
+            exact = volume_statistics(evaluate_grid(adjusted, grid, view, exact=True), grid)
+            sets.append(
+                AdjustedSet(*numbers.four, adjust=adjust, proven=proven, exact=Summary(*exact.four))
+            )
+            watch(len(sets) / (self.count + 1))
+        errors = [_effect(search, i) for i in volume.active_indices if amplitudes[i] != 0.0]
+        name = f"{self.objective}_um"
+        keys = [basis.keys[index] for index in candidates]
+        result = AdjustResult(
+            analysis=self,
+            scene=scene,
+            before=Summary(*volume.statistics(amplitudes).four),
+            errors=tuple(sorted(errors, key=lambda effect: round(getattr(effect.best, name), 6))),
+            adjustments=tuple(sets),
+            adjustable={key: self.limit_of(key) for key in keys},
+            present={key: float(amplitudes[i]) for key, i in zip(keys, candidates, strict=True)},
+            second_order=second_order(scene, view.loop),
+        )
+        error = basis.evaluate(amplitudes, orientation=False).error_um
+        at = grid.coordinates, view, grid.point_mm, grid.weights
+        uncertainty = propagation.field_uncertainty(scene, error, *at)
         return result if uncertainty is None else _with_uncertainty(result, uncertainty, basis)
 
     def included(self, scene: Scene) -> Sequence[str]:
@@ -166,7 +174,7 @@ class Adjust(Analysis):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AdjustResult(Result):
+class AdjustResult(description.Result):
     """Adjustments of a machine."""
 
     json_keys = ("objective", "before", "errors", "adjustable", "adjustments", "all_sets_compared")
@@ -194,9 +202,9 @@ class AdjustResult(Result):
     def all_sets_compared(self) -> list[bool]:
         return [adjusted.proven for adjusted in self.adjustments]
 
-    def changes(self) -> Sequence[Change]:
+    def changes(self) -> Sequence[description.Change]:
         return [
-            Change(
+            description.Change(
                 f"after adjustment: {_values(adjusted)}",
                 apply_adjustments(self.scene, adjusted.adjust),
             )
@@ -204,12 +212,12 @@ class AdjustResult(Result):
         ]
 
     def blocks(self) -> Iterator[Block]:
-        smallest = f"smallest {self._objective_words}"
+        smallest = f"smallest {OBJECTIVE_WORDS[self.objective]}"
         yield " · ".join((self.scene.title, *self._where, smallest))
         mean, rms, p95, largest = (f"{getattr(self.before, name):.2f}" for name in FOUR)
         yield f"  before: mean {mean}, RMS {rms}, P95 {p95}, max {largest} µm"
-        uncertainty = scene_uncertainty(self.scene, self.view.loop)
-        yield from u95_lines(uncertainty, {"": self.before})
+        uncertainty = propagation.scene_uncertainty(self.scene, self.view.loop)
+        yield from propagation.u95_lines(uncertainty, {"": self.before})
         columns = (
             Column("key", leads=True),
             Column("now", ".4g"),
@@ -239,7 +247,7 @@ class AdjustResult(Result):
         for effect in self.errors:
             probability = effect.best.expanded_uncertainty.get("probability")
             if probability is not None:
-                u95 = plus_minus(effect.expanded_uncertainty["u95_present"], ".3g")
+                u95 = propagation.plus_minus(effect.expanded_uncertainty["u95_present"], ".3g")
                 yield (
                     f"  {effect.key} {effect.present:.4g} {u95} {effect.unit}: best value"
                     f" {effect.best.value:.1f} improves with probability {probability:.1%}"
@@ -249,10 +257,6 @@ class AdjustResult(Result):
     @property
     def _where(self) -> tuple[str, ...]:
         return f"{self.view.loop} loop", *placed_words(self.view)
-
-    @property
-    def _objective_words(self) -> str:
-        return "largest |E|" if self.objective is Objective.MAX else "RMS |E|"
 
     def _set_blocks(self) -> Iterator[Block]:
         if not self.before.max_um:
@@ -287,13 +291,11 @@ class AdjustResult(Result):
         name = f"{self.objective}_um"
         exact: list[str] = []
         for adjusted in self.adjustments:
-            if adjusted.exact is not None:
-                um = getattr(adjusted.exact, name)
-                change = round(um - getattr(adjusted, name), 3) + 0.0
-                exact.append(f"set {len(adjusted.adjust)}: {um:.3f} µm ({change:+.3f})")
-        if exact:
-            heading = f"{self._objective_words} by the exact chain (exact − first order)"
-            yield f"  {heading}: {', '.join(exact)}"
+            um = getattr(adjusted.exact, name)
+            change = round(um - getattr(adjusted, name), 3) + 0.0
+            exact.append(f"set {len(adjusted.adjust)}: {um:.3f} µm ({change:+.3f})")
+        heading = f"{OBJECTIVE_WORDS[self.objective]} by the exact chain (exact − first order)"
+        yield f"  {heading}: {', '.join(exact)}"
 
     def _adjustments(self, adjusted: AdjustedSet) -> str:
         return ", ".join(
@@ -346,48 +348,10 @@ def apply_adjustments(scene: Scene, adjust: Mapping[str, float]) -> Scene:
     return replace(scene, title=f"{scene.title}, adjusted"[:MAX_TEXT], errors=errors)
 
 
-def find_adjustments(
-    basis: ErrorBasis,
-    grid: Grid,
-    amplitudes: Array,
-    analysis: Adjust,
-    scene: Scene,
-    watch: ProgressCallback = ignore_progress,
-) -> AdjustResult:
-    volume = Volume(basis, grid, amplitudes)
-    candidates = _candidates(volume, analysis)
-    limits = np.array([analysis.limit_of(key) for key in basis.keys])
-    low = np.maximum(-limits, -MAX_ERROR - amplitudes)
-    high = np.minimum(limits, MAX_ERROR - amplitudes)
-    bounds = np.column_stack([np.minimum(low, 0.0), np.maximum(high, 0.0)])
-    off = bool(np.any(volume.error_um))
-    count = analysis.count
-    sets: list[AdjustedSet] = []
-    search = Search(volume, analysis.objective, bounds)
-    for best, proven in search.best_sets(candidates if off else (), count):
-        values = amplitudes[list(best.indices)] + best.change
-        adjust = {basis.keys[i]: float(v) for i, v in zip(best.indices, values, strict=True)}
-        numbers = volume.statistics(volume.changed(best.indices, values))
-        sets.append(AdjustedSet(*numbers.four, adjust=adjust, proven=proven, exact=None))
-        watch(len(sets) / (count + 1))
-    errors = [_effect(search, index) for index in volume.active_indices if amplitudes[index] != 0.0]
-    objective = f"{analysis.objective}_um"
-    keys = [basis.keys[index] for index in candidates]
-    return AdjustResult(
-        analysis=analysis,
-        scene=scene,
-        before=Summary(*volume.statistics(amplitudes).four),
-        errors=tuple(sorted(errors, key=lambda effect: round(getattr(effect.best, objective), 6))),
-        adjustments=tuple(sets),
-        adjustable={key: analysis.limit_of(key) for key in keys},
-        present={key: float(amplitudes[i]) for key, i in zip(keys, candidates, strict=True)},
-    )
-
-
 def _with_uncertainty(
-    result: AdjustResult, before: FieldUncertainty, basis: ErrorBasis
+    result: AdjustResult, before: propagation.FieldUncertainty, basis: ErrorBasis
 ) -> AdjustResult:
-    def u95_after(adjust: Mapping[str, float]) -> ExpandedUncertainty[float | None]:
+    def u95_after(adjust: Mapping[str, float]) -> description.ExpandedUncertainty[float | None]:
         values = amplitudes_of(apply_adjustments(result.scene, adjust).errors, basis.keys)
         after = replace(before, error_um=basis.evaluate(values, orientation=False).error_um)
         u95 = after.with_expanded_uncertainty(result.before).expanded_uncertainty
@@ -398,7 +362,7 @@ def _with_uncertainty(
 
     def effect_with_u95(effect: Effect) -> Effect:
         best = replace(effect.best, expanded_uncertainty=u95_after({effect.key: effect.best.value}))
-        present = ExpandedUncertainty(u95_present=before.errors.u95_of(effect.key))
+        present = description.ExpandedUncertainty(u95_present=before.errors.u95_of(effect.key))
         return replace(effect, best=best, expanded_uncertainty=present)
 
     return replace(

@@ -1,21 +1,20 @@
 """Allocation of tolerances: the widest that keep a limit of |E| with a required probability."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpspace.analysis import description
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import Change, ProgressCallback, Result, count_progress
 from warpspace.analysis.options import Grammar, option, read_keys, read_numbers
 from warpspace.analysis.sampling import tolerance_search
 from warpspace.analysis.sampling.cases import Case, Reduction, both_orders
 from warpspace.analysis.sampling.distribution import Draws, Probability, machines_needed
-from warpspace.analysis.sampling.machine_sampling import montecarlo, sample_chunks
-from warpspace.analysis.sampling.sampling_options import KeptLimit
+from warpspace.analysis.sampling.machine_sampling import KeptLimit, montecarlo, sample_chunks
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.field.evaluate import compare_orders
 from warpspace.machine.axes import parameter
@@ -31,8 +30,6 @@ TRIES, NARROWER = 5, 0.99
 EXACT_MACHINES = 2000  # machines of which the answer is verified with the exact chain
 SEARCHED, WIDENED, CHECKED = 0.4, 0.2, 0.4
 """Shares of the work: the search, the scale on new machines, the checks before and after."""
-Progress = Callable[[float], object]
-"""Called with the share of the work that was done since the last call."""
 
 
 def read_costs(text: str, _scene: Scene) -> tuple[tuple[str, float], ...]:
@@ -85,9 +82,9 @@ class Allocate(KeptLimit):
     )
     fixed: Fixed = option((), "Errors whose tolerance stays unchanged")
 
-    def run(self, scene: Scene, watch: ProgressCallback, /) -> "AllocateResult":
+    def run(self, scene: Scene, watch: description.ProgressCallback, /) -> "AllocateResult":
         case = self.case(scene, self.plan_of(self.limit_um))
-        return replace(allocate(case, self, count_progress(watch, 1.0)), scene=scene)
+        return replace(allocate(case, self, description.count_progress(watch, 1.0)), scene=scene)
 
     def check_keys(self, allowed: Sequence[str]) -> None:
         for key in (*dict(self.costs), *self.fixed):
@@ -119,7 +116,7 @@ class Exact(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AllocateResult(Result):
+class AllocateResult(description.Result):
     """Allocated tolerances, and the probability that the limit is kept."""
 
     analysis: Allocate
@@ -169,11 +166,13 @@ class AllocateResult(Result):
             "exact": self.exact._asdict(),
         }
 
-    def changes(self) -> Sequence[Change]:
+    def changes(self) -> Sequence[description.Change]:
         if self.scene is None:
             return ()
         tolerances = self.scene.tolerances.with_half_widths(self.tolerances)
-        return [Change("tolerances allocated", replace(self.scene, tolerances=tolerances))]
+        return [
+            description.Change("tolerances allocated", replace(self.scene, tolerances=tolerances))
+        ]
 
     def blocks(self) -> Iterator[Block]:
         analysis, draws = self.analysis, self.draws
@@ -223,10 +222,13 @@ class AllocateResult(Result):
 def allocate(
     case: Case,
     analysis: Allocate,
-    report: Progress = lambda _: None,
+    advance: description.ProgressCallback = description.ignore_progress,
     widest: float = MAX_HALF_WIDTH,
 ) -> AllocateResult:
-    """Find the tolerances of least cost that keep a limit with a probability."""
+    """Find the tolerances of least cost that keep a limit with a probability.
+
+    `advance` is called with the share of the work that was done since its last call.
+    """
     analysis.check_keys(case.model.machine.allowed_keys)
     draws, plan = case.draws, replace(case.plan, spec_um=analysis.limit_um)
     plan.check()
@@ -251,16 +253,16 @@ def allocate(
 
     def step() -> None:
         steps.append(None)
-        report(SEARCHED / tolerance_search.MOST_STEPS)
+        advance(SEARCHED / tolerance_search.MOST_STEPS)
 
     widths = tolerance_search.search_widths(task, step)
-    report(SEARCHED * (1.0 - len(steps) / tolerance_search.MOST_STEPS))
-    scale = _new_scales(case, analysis.limit_um, needed / plan.samples, report)
+    advance(SEARCHED * (1.0 - len(steps) / tolerance_search.MOST_STEPS))
+    scale = _new_scales(case, analysis.limit_um, needed / plan.samples, advance)
     widths = None if widths is None else tolerance_search.scaled(task, widths, scale)
 
     def probability(half: Array, share: float) -> Probability:
         drawn = replace(case, draws=replace(draws, half_width=half))
-        result = montecarlo(drawn, lambda count: report(share * count / plan.samples))
+        result = montecarlo(drawn, progress=lambda n: advance(share * n / plan.samples))
         assert result.probability is not None  # noqa: S101 - the plan has a limit
         return result.probability
 
@@ -335,7 +337,7 @@ def _task(
 
 
 def _new_scales(
-    case: Case, limit_um: float, share: float, report: Progress
+    case: Case, limit_um: float, share: float, advance: description.ProgressCallback
 ) -> tolerance_search.ScaleOf:
     draws, common = case.draws, None
     if case.plan.reduction == Reduction.MAX:
@@ -350,7 +352,7 @@ def _new_scales(
             move = amplitudes - base
             if common is not None:
                 return tolerance_search.scales_within(base @ common, move @ common, limit_um)
-            gains = case.responses(case.site.random(rng, count))
+            gains = case.responses(case.random(rng, count))
             base_um = np.einsum("nk,ckn->cn", base, gains)
             return tolerance_search.scales_within(
                 base_um, np.einsum("nk,ckn->cn", move, gains), limit_um
@@ -359,7 +361,7 @@ def _new_scales(
         scales: list[Array] = []
         for part in sample_chunks(chunk, case.plan):
             scales.append(part)
-            report(WIDENED * len(part) / case.plan.samples)
+            advance(WIDENED * len(part) / case.plan.samples)
         return tolerance_search.largest_scale(np.concatenate(scales), share)
 
     return scale

@@ -16,8 +16,7 @@ from warpspace.analysis.commands.contributions import (
 from warpspace.analysis.commands.montecarlo import sampled_second_order
 from warpspace.analysis.description import ProgressCallback, Result, count_progress
 from warpspace.analysis.options import option
-from warpspace.analysis.sampling.machine_sampling import Progress, SampleStatistics, montecarlo
-from warpspace.analysis.sampling.sampling_options import KeptLimit
+from warpspace.analysis.sampling import machine_sampling
 from warpspace.exceptions import SceneError
 from warpspace.field.evaluate import build_basis
 from warpspace.field.grid import Grid
@@ -38,7 +37,7 @@ class Concept:
     """One machine of a comparison."""
 
     scene: Scene  # with the tolerances that were taken, its errors absolute
-    sampled: SampleStatistics  # |E| of machines within tolerance
+    sampled: machine_sampling.SampleStatistics  # |E| of machines within tolerance
     # what each tolerance adds to the variance of E, the largest first
     shares: ContributionsResult
 
@@ -48,7 +47,7 @@ class Concept:
 
     @property
     def json_fields(self) -> dict[str, Any]:
-        sampled, probability = self.sampled, self.sampled.probability
+        sampled = self.sampled
         return {
             "scene": self.scene.name,
             "title": self.scene.title,
@@ -56,9 +55,7 @@ class Concept:
             "mean_um": sampled.mean_um,
             "p95_um": sampled.p95_um,
             "max_um": sampled.max_um,
-            "probability": None if probability is None else probability.probability,
-            "low": None if probability is None else probability.low,
-            "high": None if probability is None else probability.high,
+            **dict(zip(("probability", "low", "high"), sampled.interval, strict=True)),
             "rms_um": self.shares.rms_um,
             "errors": [
                 {
@@ -74,7 +71,7 @@ class Concept:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Concepts(KeptLimit):
+class Concepts(machine_sampling.KeptLimit):
     """Compare machines before one of them is built.
 
     Machines of each SCENE are drawn from the same tolerances: those of the first one for
@@ -111,7 +108,7 @@ class Concepts(KeptLimit):
     def run_all(self, scenes: Sequence[Scene], watch: ProgressCallback, /) -> "ConceptsResult":
         progress = count_progress(watch, self.samples * len(scenes))
         concepts = compare_concepts(scenes, self, progress=progress)
-        left_out = sampled_second_order(*((concept.scene, concept.sampled) for concept in concepts))
+        left_out = sampled_second_order(*(concept.sampled for concept in concepts))
         return ConceptsResult(analysis=self, concepts=concepts, second_order=left_out)
 
 
@@ -170,18 +167,18 @@ class ConceptsResult(Result):
         )
 
     def _row(self, letter: str, concept: Concept) -> tuple[Any, ...]:
-        sampled, probability, scene = concept.sampled, concept.sampled.probability, concept.scene
+        sampled, scene, share = concept.sampled, concept.scene, concept.sampled.interval[0]
         leading = [value for row in concept.leading for value in (row.key, row.share)]
         return (
             letter,
             scene.name,
             scene.title,
             str(scene.machine.chain),
-            str(sampled.view.loop),
+            str(sampled.case.view.loop),
             *(sampled.mean_um, sampled.p95_um, sampled.max_um),
-            None if probability is None else probability.spec_um,
-            None if probability is None else probability.probability,
-            None if probability is None else 100.0 * probability.probability,
+            sampled.case.plan.spec_um,
+            share,
+            None if share is None else 100.0 * share,
             ", ".join(f"{row.key} {100.0 * row.share:.0f} %" for row in concept.leading),
             *leading,
             *[None] * (2 * NAMED - len(leading)),
@@ -192,7 +189,7 @@ def compare_concepts(
     scenes: Sequence[Scene],
     analysis: Concepts | None = None,
     *,
-    progress: Progress | None = None,
+    progress: machine_sampling.Progress | None = None,
 ) -> tuple[Concept, ...]:
     analysis = analysis or Concepts()
     concepts: list[Concept] = []
@@ -203,13 +200,12 @@ def compare_concepts(
                 f"tolerances: none of the {analysis.loop} loop has a width; expected one above 0"
             )
             raise SceneError(scene.name, [problem])
-        concepts.append(Concept(scene, montecarlo(case, progress), variance_contributions(case)))
+        sampled = machine_sampling.montecarlo(case, progress=progress)
+        concepts.append(Concept(scene, sampled, variance_contributions(case)))
     return tuple(concepts)
 
 
-def with_equal_tolerances(
-    scenes: Sequence[Scene], *, own_tolerances: bool = False
-) -> tuple[Scene, ...]:
+def with_equal_tolerances(scenes: Sequence[Scene], *, own_tolerances: bool) -> tuple[Scene, ...]:
     """Return scenes, errors absolute, with the tolerances of the first one by class."""
     absolute = [replace(scene, reference=None, placed=False) for scene in scenes]
     if own_tolerances or not scenes:
@@ -229,9 +225,9 @@ def with_equal_tolerances(
 
 def expected_um(concept: Concept, grid: Grid) -> Array:
     """Compute the RMS of |E| of machines within tolerance at each node, [nx, ny, nz], µm."""
-    draws, view = concept.sampled.draws, concept.sampled.view
+    case, draws = concept.sampled.case, concept.sampled.case.draws
     basis = build_basis(
-        concept.scene.model, ErrorSet(), draws.keys, grid.coordinates, view, grid.point_mm
+        case.model, ErrorSet(), draws.keys, grid.coordinates, case.view, grid.point_mm
     )
     square = np.einsum("k,k...c->...", draws.variance, basis.position**2)
     middle = np.einsum("k,k...c->...c", draws.centre, basis.position)

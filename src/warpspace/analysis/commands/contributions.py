@@ -18,7 +18,7 @@ from warpspace.analysis.blocks import (
 from warpspace.analysis.description import ProgressCallback, Result
 from warpspace.analysis.options import error_words, option
 from warpspace.analysis.sampling.cases import Case, Reduction, SamplingPlan, reduce_nodes
-from warpspace.analysis.sampling.sampling_options import Sampled
+from warpspace.analysis.sampling.machine_sampling import Sampled
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, amplitudes_of, build_basis, error_values, evaluate_exact
 from warpspace.kinematics.chain import columns, nominal_point
@@ -59,14 +59,10 @@ def expected_square(case: Case) -> tuple[Array, float]:
 
     The variance is that of each parameter, var(aₖ)·|Jₖ|², [K]; beside it |J·centre|², µm².
     """
-    draws, gains = case.draws, _average_gains(case)
+    draws, gains = case.draws, case.responses(case.average())
     variance = draws.variance * np.mean(np.sum(gains**2, axis=0), axis=1)
     middle = np.einsum("k,ckn->cn", draws.centre, gains)
     return variance, float(np.mean(np.sum(middle**2, axis=0)))
-
-
-def _average_gains(case: Case) -> Array:
-    return case.responses(case.site.average())
 
 
 def variance_contributions(case: Case, sobol: int | None = None) -> "ContributionsResult":
@@ -95,7 +91,7 @@ def variance_contributions(case: Case, sobol: int | None = None) -> "Contributio
 
 
 def _sampled_variance(case: Case) -> Array:
-    draws, gains = case.draws, _average_gains(case)
+    draws, gains = case.draws, case.responses(case.average())
     gains = gains[:, :, :: max(1, gains.shape[2] // CHECK_NODES)]
     values = draws.draw(np.random.default_rng(case.plan.seed), CHECK_MACHINES)
     centred = values - values.mean(axis=0)
@@ -208,39 +204,36 @@ class ContributionsResult(Result):
         ]  # fmt: skip
         yield f"{self.title} · {self.where}"
         yield Table(columns, cells)
-        title = f"Contributions of tolerances · {self.title}"
-        yield share_bars(self.rows, title, self.where)
+        yield self._bars(with_sobol=with_sobol)
 
-
-def share_bars(rows: tuple[Share, ...], title: str, subtitle: str) -> Bars:
-    shares = Series([100.0 * row.share for row in rows], "exact", "key", form=".1f")
-    sampled = [100.0 * row.sampled_share for row in rows]
-    panels = [
-        Panel(
-            "share of the variance of E",
-            (shares, Series(sampled, f"from {CHECK_MACHINES:,} sampled machines", as_mark=True)),
-            "%",
-        )
-    ]
-    if any(row.sobol_total is not None for row in rows):
-        total = [row.sobol_total or 0.0 for row in rows]
-        spread = [row.sobol_total_confidence or 0.0 for row in rows]
-        first = [max(row.sobol_first or 0.0, 0.0) for row in rows]
-        indices = (
-            Series(total, "Sobol total, 95 % interval", spread=spread),
-            Series(first, as_mark=True),
-        )
-        panels.append(Panel("Sobol index of the mean |E| of a machine", indices))
-    legend: list[tuple[str, Role]] = [
-        ("exact share", "key"),
-        (f"stroke: from {CHECK_MACHINES:,} sampled machines", "none"),
-    ]
-    if len(panels) > 1:
-        legend.append(("Sobol index, total with its 95 % interval; stroke: first order", "plain"))
-    return Bars(
-        title, subtitle, [error_words(row.key) for row in rows], tuple(panels),
-        legend=tuple(legend),
-    )  # fmt: skip
+    def _bars(self, *, with_sobol: bool) -> Bars:
+        rows = self.rows
+        panels = [
+            Panel(
+                "share of the variance of E",
+                (
+                    Series([100.0 * row.share for row in rows], role="key", form=".1f"),
+                    Series([100.0 * row.sampled_share for row in rows], as_mark=True),
+                ),
+                "%",
+            )
+        ]
+        legend: list[tuple[str, Role]] = [
+            ("exact share", "key"),
+            (f"stroke: from {CHECK_MACHINES:,} sampled machines", "none"),
+        ]
+        if with_sobol:
+            total = [row.sobol_total or 0.0 for row in rows]
+            spread = [row.sobol_total_confidence or 0.0 for row in rows]
+            first = [max(row.sobol_first or 0.0, 0.0) for row in rows]
+            indices = Series(total, spread=spread), Series(first, as_mark=True)
+            panels.append(Panel("Sobol index of the mean |E| of a machine", indices))
+            words = "Sobol index, total with its 95 % interval; stroke: first order"
+            legend.append((words, "plain"))
+        return Bars(
+            f"Contributions of tolerances · {self.title}", self.where,
+            [error_words(row.key) for row in rows], tuple(panels), legend=tuple(legend),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,14 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from warpspace.analysis import description
 from warpspace.analysis.blocks import Block, Column, Table
-from warpspace.analysis.description import (
-    Analysis,
-    ExpandedUncertainty,
-    ProgressCallback,
-    Result,
-    count_progress,
-)
 from warpspace.analysis.options import LOOP_HELP, LOOP_UNSET, option
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
 from warpspace.exceptions import OptionError
@@ -41,13 +35,13 @@ class FormDeviation:
     at: str  # where the other axes stand
     value: float
     unit: str
-    expanded_uncertainty: ExpandedUncertainty[float | None] = field(
-        default_factory=ExpandedUncertainty[float | None]
+    expanded_uncertainty: description.ExpandedUncertainty[float | None] = field(
+        default_factory=description.ExpandedUncertainty[float | None]
     )
 
 
 @dataclass(frozen=True, kw_only=True)
-class Form(Analysis):
+class Form(description.Analysis):
     """Evaluate flatness, straightness and squareness of SCENE.
 
     The form that an inspector would measure on a part with the shape of the distorted volume.
@@ -62,7 +56,7 @@ class Form(Analysis):
     nodes: int = option(11, "Nodes per axis of the working volume", low=3, high=41, flag="--grid")
     loop: Loop | None = option(None, LOOP_HELP, unset=LOOP_UNSET)
 
-    def run(self, scene: Scene, watch: ProgressCallback, /) -> "FormResult":
+    def run(self, scene: Scene, watch: description.ProgressCallback, /) -> "FormResult":
         grid = build_grid(scene.model, scene.workspace, self.nodes)
         axes = grid.axes
         if sum(map(bool, axes)) < 2 or not all(is_linear(axis) for axis in axes if axis):
@@ -73,7 +67,7 @@ class Form(Analysis):
         deviations = tuple(volume.deviations(error))
         uncertainty = field_uncertainty(scene, error, grid.coordinates, view, grid.point_mm)
         n_evaluations = 2 * (1 + len(uncertainty.errors.keys)) if uncertainty else 1
-        advance = count_progress(watch, n_evaluations)
+        advance = description.count_progress(watch, n_evaluations)
         advance(1)
         if uncertainty is None:
             return FormResult(deviations=deviations, title=scene.title, loop=view.loop)
@@ -84,7 +78,7 @@ class Form(Analysis):
 
         u95 = uncertainty.propagate(deviation_values)
         deviations = tuple(
-            replace(deviation, expanded_uncertainty=ExpandedUncertainty(u95=expanded))
+            replace(deviation, expanded_uncertainty=description.ExpandedUncertainty(u95=expanded))
             for deviation, expanded in zip(deviations, u95, strict=True)
         )
         return FormResult(
@@ -96,7 +90,7 @@ class Form(Analysis):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FormResult(Result):
+class FormResult(description.Result):
     """Form deviations of the distorted volume."""
 
     json_keys = ("deviations",)

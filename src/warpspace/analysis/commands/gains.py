@@ -21,7 +21,7 @@ from warpspace.analysis.options import (
     option,
     place_words,
 )
-from warpspace.analysis.publications import PUBLICATIONS
+from warpspace.analysis.registry import PUBLICATIONS
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import JacobianColumn as Response
@@ -58,21 +58,14 @@ def lever_parts(model: Model, loop: Loop, key: str, at: Mapping[str, float]) -> 
         if started:
             stops.append((f"{name} motion", frames.after[:3, 3]))
         last = frames.after
-    stops += _end_stops(model, side, last)
+    for name, offset, rotation in model.machine.end_frames(side):
+        last = last @ transforms.placed(offset, rotation)
+        stops.append((name, last[:3, 3]))
+    point = model.tool_point_mm if side == "tool" else model.workpiece_point_mm
+    stops.append(("point", transforms.apply(last, point)))
     pairs = pairwise(stops)
     vectors = [(name, vector(end - start)) for (_, start), (name, end) in pairs]
     return tuple((name, vector) for name, vector in vectors if any(vector))
-
-
-def _end_stops(model: Model, side: str, last: Array) -> list[tuple[str, Array]]:
-    pose = last
-    stops: list[tuple[str, Array]] = []
-    for name, offset, rotation in model.machine.end_frames(side):
-        pose = pose @ transforms.placed(offset, rotation)
-        stops.append((name, pose[:3, 3]))
-    point = model.tool_point_mm if side == "tool" else model.workpiece_point_mm
-    stops.append(("point", transforms.apply(pose, point)))
-    return stops
 
 
 def vector(values: Array) -> tuple[float, float, float]:
@@ -132,8 +125,11 @@ def gains_at(
     coordinates = complete_coordinates(model.machine, at)
     point = nominal_point(model, loop, coordinates)
     columns = responses(model, loop, chosen, coordinates, point)
-    position = {name: float(value) for name, value in coordinates.items()}
-    rows = [_gain(model, loop, key, columns[key], position) for key in chosen]
+    rows: list[Gain] = []
+    for key in chosen:
+        x, y, z = vector(np.broadcast_to(columns[key].position, (3,)))
+        largest = _larger(model, loop, key, columns[key], coordinates)
+        rows.append(replace(largest, x=x, y=y, z=z))
     return mark_key_errors(rows, share)
 
 
@@ -171,21 +167,13 @@ def mark_key_errors(rows: Sequence[Gain], share: float = DEFAULT_SHARE) -> tuple
     )
 
 
-def _gain(model: Model, loop: Loop, key: str, col: Response, at: Mapping[str, float]) -> Gain:
-    position = np.broadcast_to(col.position, (3,))
-    x, y, z = vector(position)
-    norm = float(np.linalg.norm(position))
-    parts = lever_parts(model, loop, key, at)
-    return Gain(key, x, y, z, norm, vector(np.broadcast_to(col.lever_mm, (3,))), at, parts)
-
-
 def _larger(
     model: Model,
     loop: Loop,
     key: str,
     col: Response,
     coordinates: Mapping[str, Array],
-    best: Gain | None,
+    best: Gain | None = None,
 ) -> Gain:
     shape = np.broadcast_shapes(*(values.shape for values in coordinates.values()))
     size = np.abs(np.broadcast_to(col.position, (*shape, 3)))

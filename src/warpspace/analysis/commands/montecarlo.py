@@ -3,12 +3,11 @@
 import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import islice, product
 from math import prod
 from operator import attrgetter
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, TypeAlias, Unpack
 
 import numpy as np
 
@@ -16,15 +15,14 @@ from warpspace.analysis.blocks import Block, Column, Histogram, Table, number_co
 from warpspace.analysis.commands.contributions import expected_square
 from warpspace.analysis.description import ProgressCallback, Result, count_progress, to_json
 from warpspace.analysis.options import Grammar, option
-from warpspace.analysis.publications import PUBLICATIONS, PrintedNumber
+from warpspace.analysis.registry import PUBLICATIONS, PrintedNumber
 from warpspace.analysis.sampling.cases import DEFAULT_NODES, Case, Reduction, both_orders
 from warpspace.analysis.sampling.machine_sampling import (
-    Progress,
+    Execution,
+    SampledMachines,
     SampleStatistics,
-    Take,
     montecarlo_each,
 )
-from warpspace.analysis.sampling.sampling_options import SampledMachines
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.field.evaluate import SecondOrder, compare_orders
 from warpspace.machine.errors import TOLERANCE_CLASSES
@@ -87,18 +85,17 @@ class SweepPoint:
 
     @property
     def row(self) -> dict[str, Any]:
-        sampled, probability = self.sampled, self.sampled.probability
+        sampled, plan = self.sampled, self.sampled.case.plan
+        names = "probability", "probability_low", "probability_high"
         return {
             "scene": self.scene.name,
             "title": self.scene.title,
             **self.half_widths,
-            "samples": sampled.plan.samples,
-            "seed": sampled.plan.seed,
+            "samples": plan.samples,
+            "seed": plan.seed,
             **{name: getattr(sampled, name) for name in NUMBERS.values()},
-            "spec_um": None if probability is None else probability.spec_um,
-            "probability": None if probability is None else probability.probability,
-            "probability_low": None if probability is None else probability.low,
-            "probability_high": None if probability is None else probability.high,
+            "spec_um": plan.spec_um,
+            **dict(zip(names, sampled.interval, strict=True)),
         }
 
 
@@ -126,6 +123,7 @@ class MonteCarlo(SampledMachines):
     doing = "sampling"
     has_chart = True
     chart_help = "histogram"
+    run_options = tuple(Execution.__annotations__)
     over: Reduction = option(
         Reduction.SAMPLED,
         "|E| at one random point per machine, or its largest or mean over a machine's points",
@@ -155,23 +153,19 @@ class MonteCarlo(SampledMachines):
         scenes: Sequence[Scene],
         watch: ProgressCallback,
         /,
-        *,
-        executor: Executor | None = None,
-        workers: int | None = None,
-        progress: Progress | None = None,
-        take: Take | None = None,
+        **execution: Unpack[Execution],
     ) -> "MonteCarloResult":
         self.check_against(len(scenes))
         counted = count_progress(watch, self.machines(len(scenes)))
+        progress = execution.get("progress")
 
         def advance(count: int) -> None:
             counted(count)
             if progress is not None:
                 progress(count)
 
-        points = self.points(
-            scenes, executor=executor, workers=workers, progress=advance, take=take
-        )
+        execution["progress"] = advance
+        points = self.points(scenes, **execution)
         first = next(points)
         widest, retained, rows = first, [first], [first.row] if self.in_rows else []
         for point in points:
@@ -185,7 +179,7 @@ class MonteCarlo(SampledMachines):
             analysis=self,
             points=tuple(retained),
             rows=tuple(rows),
-            second_order=sampled_second_order((widest.scene, widest.sampled)),
+            second_order=sampled_second_order(widest.sampled),
         )
 
     @property
@@ -214,16 +208,11 @@ class MonteCarlo(SampledMachines):
             raise OptionError(f"{count:,} {what}; expected at most {SWEEP_CASES:,}")
 
     def points(
-        self,
-        scenes: Iterable[Scene],
-        *,
-        executor: Executor | None = None,
-        workers: int | None = None,
-        progress: Progress | None = None,
-        take: Take | None = None,
+        self, scenes: Iterable[Scene], **execution: Unpack[Execution]
     ) -> "Iterator[SweepPoint]":
         """Sample scenes as they are needed; the last half width changes first."""
-        plan = replace(self.plan(self.over, self.limit_um, self.grid), workers=workers)
+        plan = self.plan(self.over, self.limit_um, self.grid)
+        plan = replace(plan, workers=execution.get("workers"))
         plan.check()
         steps = dict(self.tolerance)
         waiting: deque[tuple[Scene, Mapping[str, float]]] = deque()
@@ -236,9 +225,7 @@ class MonteCarlo(SampledMachines):
                     waiting.append((chosen, point))
                     yield self.case(chosen, plan)
 
-        for sampled in montecarlo_each(
-            cases(), workers=workers, executor=executor, progress=progress, take=take
-        ):
+        for sampled in montecarlo_each(cases(), **execution):
             yield SweepPoint(*waiting.popleft(), sampled)
 
 
@@ -255,18 +242,11 @@ class MonteCarloResult(Result):
         """Statistics of the first scene."""
         return self.points[0].sampled
 
-    mean_um = property(attrgetter("sampled.mean_um"))
-    rms_um = property(attrgetter("sampled.rms_um"))
-    mode_um = property(attrgetter("sampled.mode_um"))
-    median_um = property(attrgetter("sampled.median_um"))
-    p95_um = property(attrgetter("sampled.p95_um"))
-    p99_um = property(attrgetter("sampled.p99_um"))
-    max_um = property(attrgetter("sampled.max_um"))
-    histogram = property(attrgetter("sampled.histogram"))
-    probability = property(attrgetter("sampled.probability"))
-    plan = property(attrgetter("sampled.plan"))
-    draws = property(attrgetter("sampled.draws"))
-    view = property(attrgetter("sampled.view"))
+    def __getattr__(self, name: str) -> Any:
+        """Return a statistic of the first scene, such as `p95_um`."""
+        if name not in SampleStatistics.__dataclass_fields__:
+            raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}")
+        return getattr(self.sampled, name)
 
     def json_fields(self) -> dict[str, Any]:
         analysis = self.analysis
@@ -291,8 +271,8 @@ class MonteCarloResult(Result):
         analysis, first = self.analysis, self.points[0].sampled
         if analysis.in_rows:
             yield (
-                f"{first.view.loop} loop · {analysis.samples:,} machines a row, {analysis.over} ·"
-                f" {first.draws.distribution} · seed {analysis.seed}"
+                f"{first.case.view.loop} loop · {analysis.samples:,} machines a row,"
+                f" {analysis.over} · {first.case.draws.distribution} · seed {analysis.seed}"
             )
         else:
             yield self._settings(first)
@@ -331,10 +311,10 @@ class MonteCarloResult(Result):
         printed: dict[str, PrintedNumber] = {}
         if analysis.over is Reduction.SAMPLED:
             for publication in PUBLICATIONS.members():
-                number = publication.sampled_mean(scene, sampled.view.loop)
+                number = publication.sampled_mean(scene, sampled.case.view.loop)
                 if number is not None:
                     printed[publication.name] = number
-            variance, offset = expected_square(case_of(scene, sampled))
+            variance, offset = expected_square(sampled.case)
             expected_um = math.sqrt(variance.sum() + offset)
             yield (
                 f"  RMS  {sampled.rms_um:.2f} µm sampled, {expected_um:.2f} µm"
@@ -348,7 +328,7 @@ class MonteCarloResult(Result):
                 f" {100.0 * probability.probability:.2f} % of the machines, 95 % interval"
                 f" {100.0 * probability.low:.2f} … {100.0 * probability.high:.2f} %"
             )
-        draws = sampled.draws
+        draws = sampled.case.draws
         centred = [k for k, width in zip(draws.keys, draws.half_width, strict=True) if width == 0.0]
         count = len(draws.keys) - len(centred)
         note = f"; held at their centre: {', '.join(centred)}" if centred else ""
@@ -359,24 +339,25 @@ class MonteCarloResult(Result):
         yield sampled_histogram(sampled, scene.title, settings, marks)
 
     def _settings(self, sampled: SampleStatistics) -> str:
-        analysis, drawn = self.analysis, str(sampled.draws.distribution)
+        analysis, draws = self.analysis, sampled.case.draws
+        drawn = str(draws.distribution)
         if drawn == "normal":
-            drawn = "normal, 3σ = half width" + (", clipped" if sampled.draws.clip else "")
+            drawn = "normal, 3σ = half width" + (", clipped" if draws.clip else "")
         return (
-            f"{sampled.view.loop} loop · {analysis.samples:,} machines, {WHAT[analysis.over]}"
+            f"{sampled.case.view.loop} loop · {analysis.samples:,} machines, {WHAT[analysis.over]}"
             f" · {drawn} · seed {analysis.seed}"
         )
 
 
 def _numbers(sampled: SampleStatistics) -> dict[str, Any]:
-    plan = sampled.plan
+    case, plan = sampled.case, sampled.case.plan
     probability = {} if sampled.probability is None else {"specification": sampled.probability}
     return to_json(
         {
             "samples": plan.samples,
             "seed": plan.seed,
-            "distribution": sampled.draws.distribution,
-            "loop": sampled.view.loop,
+            "distribution": case.draws.distribution,
+            "loop": case.view.loop,
             "over": plan.reduction,
             **{name: getattr(sampled, name) for name in JSON_NUMBERS},
             **probability,
@@ -405,30 +386,21 @@ def sampled_histogram(
         "volumetric error |E|, µm",
         f"machines per {edges[1] - edges[0]:g} µm, %",
         edges,
-        100.0 * sampled.histogram.counts / sampled.plan.samples,
+        100.0 * sampled.histogram.counts / sampled.case.plan.samples,
         (*marks, *printed),
-        sampled.plan.spec_um,
+        sampled.case.plan.spec_um,
         captions,
     )
 
 
-def sampled_second_order(*sampled: tuple[Scene, SampleStatistics]) -> SecondOrder:
+def sampled_second_order(*sampled: SampleStatistics) -> SecondOrder:
     """Compare first order and exact chain on machines drawn for the scene with the largest |E|."""
-    return compare_orders(*both_orders(case_of(*max(sampled, key=lambda pair: pair[1].max_um))))
-
-
-def case_of(scene: Scene, sampled: SampleStatistics) -> Case:
-    return Case(scene.model, sampled.draws, scene.workspace, sampled.view, sampled.plan)
+    return compare_orders(*both_orders(max(sampled, key=attrgetter("max_um")).case))
 
 
 def sweep(
     scenes: Iterable[Scene],
     half_widths: Mapping[str, Sequence[float]] | None = None,
-    *,
-    workers: int | None = None,
-    executor: Executor | None = None,
-    progress: Progress | None = None,
-    take: Take | None = None,
     **options: Any,
 ) -> Iterator[SweepPoint]:
     """Sample machines of many scenes, with every combination of some half widths.
@@ -448,8 +420,8 @@ def sweep(
         Called with the number of machines done since the last call; with the number of a case and
         |E| of its next machines, in order.
     options
-        Of `montecarlo`. Every point has the same seed, so that points differ by their half widths
-        and not by chance.
+        The other options of `montecarlo`. Every point has the same seed, so that points differ by
+        their half widths and not by chance.
 
     Yields
     ------
@@ -464,11 +436,10 @@ def sweep(
         If an argument is out of range, or a scene has no such parameter.
     """
     steps = tuple((key, tuple(values)) for key, values in (half_widths or {}).items())
+    execution = {key: options.pop(key) for key in MonteCarlo.run_options if key in options}
     analysis = MonteCarlo(tolerance=steps, **options)
     analysis.check_against(1)
-    yield from analysis.points(
-        scenes, workers=workers, executor=executor, progress=progress, take=take
-    )
+    yield from analysis.points(scenes, **execution)
 
 
 def with_half_widths(scene: Scene, half_widths: Mapping[str, float]) -> Scene:

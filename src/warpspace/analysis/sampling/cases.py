@@ -67,131 +67,6 @@ def choose_cylinder(model: Model, cylinder: Cylinder | None = None) -> Cylinder:
     return cylinder
 
 
-@dataclass(frozen=True, slots=True)
-class Site:
-    """A machine and the volume it is evaluated in.
-
-    Tool and relative loop: over the working volume, other axes at their place in the workspace.
-    Workpiece loop: over the volume of the largest workpiece, its rotary axes over their travel.
-    """
-
-    model: Model
-    workspace: Workspace
-    loop: Loop
-    size: Cylinder | None = None  # largest workpiece; the model's by default
-
-    @property
-    def ranges(self) -> dict[str, tuple[float, float]]:
-        """Ranges of the axes that vary."""
-        spans, axes = self.workspace.ranges, self.model.machine.axes
-        if self.loop is not Loop.WORKPIECE:
-            return {
-                name: span for name, span in spans.items() if name in axes and span[0] < span[1]
-            }
-        return {
-            axis.name: spans[axis.name] if axis.is_linear else axis.travel
-            for axis in self.model.machine.branch("workpiece")
-        }
-
-    @property
-    def dimensions(self) -> int:
-        """Number of coordinates of a place."""
-        return len(self.ranges) + (3 if self.loop is Loop.WORKPIECE else 0)
-
-    def random(self, rng: np.random.Generator, count: int) -> Places:
-        return self.places(rng.random((count, self.dimensions)))
-
-    def spread(self, nodes: int) -> Places:
-        """Return the nodes for the mean over the points of one machine.
-
-        The grid of the working volume, each node with its share of the volume. For the workpiece
-        loop nodes³ low-discrepancy points (Sobol sequence) over cylinder and rotary travel, since a
-        five-dimensional grid would be either coarse or huge.
-        """
-        if self.loop is not Loop.WORKPIECE:
-            grid = build_grid(self.model, self.workspace, nodes)
-            return Places(grid.coordinates, grid.nominal_mm, grid.weights.reshape(-1))
-        count = node_counts(nodes)[0] ** 3
-        # Whole powers of two keep the balance of the sequence; the surplus is cut off.
-        return self._sobol(math.ceil(math.log2(count)), count)
-
-    def extreme(self, nodes: int) -> Places:
-        """Return the nodes for the largest error of one machine.
-
-        For constant parameters E is affine in the linear axes and in the point of the workpiece, so
-        that |E| is convex in them and largest at a corner of the volume or on a rim of the
-        cylinder: those give exactly the maximum over any grid. Rotary axes, and the angle round the
-        rim, are covered with `nodes` positions.
-        """
-        node_counts(nodes)
-        along = {
-            name: _rotary_nodes(low, high, nodes) if is_rotary(name) else np.array([low, high])
-            for name, (low, high) in self.ranges.items()
-        }
-        if self.loop is not Loop.WORKPIECE:
-            axes = dict(zip(along, np.meshgrid(*along.values()), strict=True))
-            coordinates = self._complete(axes)
-            flat = {name: np.ravel(values) for name, values in coordinates.items()}
-            return Places(flat, nominal_point(self.model, Loop.TOOL, flat))
-        size = choose_cylinder(self.model, self.size)
-        turn = _rotary_nodes(0.0, FULL_TURN, nodes)
-        mesh = np.meshgrid(*along.values(), np.array([0.0, size.height_mm]), turn)
-        *moving, height, angle = (values.ravel() for values in mesh)
-        axes = dict(zip(along, moving, strict=True))
-        return self._on_workpiece(axes, (size.diameter_mm / 2.0, angle, height))
-
-    def average(self) -> Places:
-        """Return places whose unweighted mean is exact for functions quadratic in the points.
-
-        Two Gauss points per linear axis, which is exact for the square of an error, and the middles
-        of 16 parts of the range of a rotary one; for the workpiece loop 2¹⁴ points of a Sobol
-        sequence, which is good to about 0.01 %.
-        """
-        if self.loop is Loop.WORKPIECE:
-            return self._sobol(AVERAGE_POWER)
-        gauss = 0.5 + np.array([-0.5, 0.5]) / math.sqrt(3.0)
-        middles = (np.arange(ROTARY_PARTS) + 0.5) / ROTARY_PARTS
-        mesh = np.meshgrid(*(gauss if is_linear(name) else middles for name in self.ranges))
-        return self.places(
-            np.stack([values.ravel() for values in mesh], -1) if mesh else np.zeros((1, 0))
-        )
-
-    def places(self, unit: Array) -> Places:
-        """Map numbers between 0 and 1, [n, dimensions], to places."""
-        axes = {
-            name: low + (high - low) * unit[:, index]
-            for index, (name, (low, high)) in enumerate(self.ranges.items())
-        }
-        if self.loop is not Loop.WORKPIECE:
-            coordinates = self._complete(axes)
-            return Places(coordinates, nominal_point(self.model, Loop.TOOL, coordinates))
-        size = choose_cylinder(self.model, self.size)
-        radius = size.diameter_mm / 2.0 * np.sqrt(unit[:, -3])
-        return self._on_workpiece(
-            axes, (radius, FULL_TURN * unit[:, -2], size.height_mm * unit[:, -1])
-        )
-
-    def _sobol(self, power: int, count: int | None = None) -> Places:
-        from scipy.stats import qmc
-
-        sequence = qmc.Sobol(self.dimensions, scramble=True, rng=0)
-        return self.places(sequence.random_base2(power)[:count])
-
-    def _complete(self, axes: dict[str, Array]) -> dict[str, Array]:
-        return complete_coordinates(self.model.machine, axes, self.workspace.positions)
-
-    def _on_workpiece(
-        self, axes: dict[str, Array], point: tuple[Array | float, Array, Array]
-    ) -> Places:
-        """Place points of the workpiece, given as radius [mm], angle [degrees] and height [mm]."""
-        coordinates = self._complete(axes)
-        radius, degrees, height = point
-        angle = np.deg2rad(degrees)
-        local = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], -1)
-        pose = branch_pose(self.model, "workpiece", coordinates)
-        return Places(coordinates, transforms.apply(pose, local))
-
-
 def _rotary_nodes(low: float, high: float, nodes: int) -> Array:
     full = high - low >= FULL_TURN
     return np.linspace(low, low + FULL_TURN if full else high, nodes, endpoint=not full)
@@ -299,7 +174,11 @@ def reduce_nodes(
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One Monte Carlo run."""
+    """One Monte Carlo run: a machine, and the volume it is evaluated in.
+
+    Tool and relative loop: over the working volume, other axes at their place in the workspace.
+    Workpiece loop: over the volume of the largest workpiece, its rotary axes over their travel.
+    """
 
     model: Model
     draws: Draws  # the parameters and their distributions, see `build_draws`
@@ -313,8 +192,115 @@ class Case:
             choose_cylinder(self.model, self.plan.cylinder)
 
     @property
-    def site(self) -> Site:
-        return Site(self.model, self.workspace, self.view.loop, self.plan.cylinder)
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Ranges of the axes that vary."""
+        spans, axes = self.workspace.ranges, self.model.machine.axes
+        if self.view.loop is not Loop.WORKPIECE:
+            return {
+                name: span for name, span in spans.items() if name in axes and span[0] < span[1]
+            }
+        return {
+            axis.name: spans[axis.name] if axis.is_linear else axis.travel
+            for axis in self.model.machine.branch("workpiece")
+        }
+
+    @property
+    def dimensions(self) -> int:
+        """Number of coordinates of a place."""
+        return len(self.ranges) + (3 if self.view.loop is Loop.WORKPIECE else 0)
+
+    def random(self, rng: np.random.Generator, count: int) -> Places:
+        return self.places(rng.random((count, self.dimensions)))
+
+    def spread(self, nodes: int) -> Places:
+        """Return the nodes for the mean over the points of one machine.
+
+        The grid of the working volume, each node with its share of the volume. For the workpiece
+        loop nodes³ low-discrepancy points (Sobol sequence) over cylinder and rotary travel, since a
+        five-dimensional grid would be either coarse or huge.
+        """
+        if self.view.loop is not Loop.WORKPIECE:
+            grid = build_grid(self.model, self.workspace, nodes)
+            return Places(grid.coordinates, grid.nominal_mm, grid.weights.reshape(-1))
+        count = node_counts(nodes)[0] ** 3
+        # Whole powers of two keep the balance of the sequence; the surplus is cut off.
+        return self._sobol(math.ceil(math.log2(count)), count)
+
+    def extreme(self, nodes: int) -> Places:
+        """Return the nodes for the largest error of one machine.
+
+        For constant parameters E is affine in the linear axes and in the point of the workpiece, so
+        that |E| is convex in them and largest at a corner of the volume or on a rim of the
+        cylinder: those give exactly the maximum over any grid. Rotary axes, and the angle round the
+        rim, are covered with `nodes` positions.
+        """
+        node_counts(nodes)
+        along = {
+            name: _rotary_nodes(low, high, nodes) if is_rotary(name) else np.array([low, high])
+            for name, (low, high) in self.ranges.items()
+        }
+        if self.view.loop is not Loop.WORKPIECE:
+            axes = dict(zip(along, np.meshgrid(*along.values()), strict=True))
+            coordinates = self._complete(axes)
+            flat = {name: np.ravel(values) for name, values in coordinates.items()}
+            return Places(flat, nominal_point(self.model, Loop.TOOL, flat))
+        size = choose_cylinder(self.model, self.plan.cylinder)
+        turn = _rotary_nodes(0.0, FULL_TURN, nodes)
+        mesh = np.meshgrid(*along.values(), np.array([0.0, size.height_mm]), turn)
+        *moving, height, angle = (values.ravel() for values in mesh)
+        axes = dict(zip(along, moving, strict=True))
+        return self._on_workpiece(axes, (size.diameter_mm / 2.0, angle, height))
+
+    def average(self) -> Places:
+        """Return places whose unweighted mean is exact for functions quadratic in the points.
+
+        Two Gauss points per linear axis, which is exact for the square of an error, and the middles
+        of 16 parts of the range of a rotary one; for the workpiece loop 2¹⁴ points of a Sobol
+        sequence, which is good to about 0.01 %.
+        """
+        if self.view.loop is Loop.WORKPIECE:
+            return self._sobol(AVERAGE_POWER)
+        gauss = 0.5 + np.array([-0.5, 0.5]) / math.sqrt(3.0)
+        middles = (np.arange(ROTARY_PARTS) + 0.5) / ROTARY_PARTS
+        mesh = np.meshgrid(*(gauss if is_linear(name) else middles for name in self.ranges))
+        return self.places(
+            np.stack([values.ravel() for values in mesh], -1) if mesh else np.zeros((1, 0))
+        )
+
+    def places(self, unit: Array) -> Places:
+        """Map numbers between 0 and 1, [n, dimensions], to places."""
+        axes = {
+            name: low + (high - low) * unit[:, index]
+            for index, (name, (low, high)) in enumerate(self.ranges.items())
+        }
+        if self.view.loop is not Loop.WORKPIECE:
+            coordinates = self._complete(axes)
+            return Places(coordinates, nominal_point(self.model, Loop.TOOL, coordinates))
+        size = choose_cylinder(self.model, self.plan.cylinder)
+        radius = size.diameter_mm / 2.0 * np.sqrt(unit[:, -3])
+        return self._on_workpiece(
+            axes, (radius, FULL_TURN * unit[:, -2], size.height_mm * unit[:, -1])
+        )
+
+    def _sobol(self, power: int, count: int | None = None) -> Places:
+        from scipy.stats import qmc
+
+        sequence = qmc.Sobol(self.dimensions, scramble=True, rng=0)
+        return self.places(sequence.random_base2(power)[:count])
+
+    def _complete(self, axes: dict[str, Array]) -> dict[str, Array]:
+        return complete_coordinates(self.model.machine, axes, self.workspace.positions)
+
+    def _on_workpiece(
+        self, axes: dict[str, Array], point: tuple[Array | float, Array, Array]
+    ) -> Places:
+        """Place points of the workpiece, given as radius [mm], angle [degrees] and height [mm]."""
+        coordinates = self._complete(axes)
+        radius, degrees, height = point
+        angle = np.deg2rad(degrees)
+        local = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], -1)
+        pose = branch_pose(self.model, "workpiece", coordinates)
+        return Places(coordinates, transforms.apply(pose, local))
 
     @property
     def is_exact(self) -> bool:
@@ -338,17 +324,16 @@ class Case:
 
     def common_places(self) -> Places:
         """Return the points for the largest or the mean of each machine."""
-        find = self.site.spread if self.plan.reduction == Reduction.MEAN else self.site.extreme
-        return find(self.plan.nodes)
+        nodes = self.plan.nodes
+        return self.spread(nodes) if self.plan.reduction == "mean" else self.extreme(nodes)
 
     def build_job(self) -> Job:
         quantity = Reduction(self.plan.reduction)
         if quantity is Reduction.SAMPLED:
-            site = self.site
 
             def one_point_each(rng: np.random.Generator, count: int) -> Array:
                 amplitudes = self.draws.draw(rng, count)
-                gains = self.responses(site.random(rng, count))
+                gains = self.responses(self.random(rng, count))
                 return np.sqrt(
                     sum((np.einsum("nk,kn->n", amplitudes, gain) ** 2) for gain in gains)
                 )
@@ -370,14 +355,14 @@ def both_orders(case: Case, count: int = EXACT_MACHINES) -> tuple[Array, Array]:
     rng, n_machines = case.plan.block(0)
     amplitudes = case.draws.draw(rng, n_machines)[:count]
     if case.plan.reduction == Reduction.SAMPLED:
-        places = case.site.random(rng, n_machines)
+        places = case.random(rng, n_machines)
         axes = {
             key: np.broadcast_to(q, n_machines)[:count, None]
             for key, q in places.coordinates.items()
         }
         point = np.broadcast_to(places.point_mm, (n_machines, 3))[:count, None]
     else:
-        places = case.site.extreme(case.plan.nodes)
+        places = case.extreme(case.plan.nodes)
         axes, point = places.coordinates, places.point_mm
         amplitudes = amplitudes[: max(1, EXACT_POINTS // len(point))]
     values = dict(zip(case.draws.keys, amplitudes.T[..., None], strict=True))

@@ -94,7 +94,7 @@ class Stream:
         self.count = 0
         self.spec_um = spec_um
         self._within = 0
-        self._sum = self._sum_squares = self._largest = 0.0
+        self._sum = self._sum_squares = self.max_um = 0.0
         self._values = np.empty(expected) if expected <= EXACT_SAMPLES else None
         self._fine = np.zeros(_BINS + 2, dtype=np.int64) if self._values is None else None
 
@@ -112,7 +112,7 @@ class Stream:
         for block, squares in zip(part.sums, part.square_sums, strict=True):
             self._sum += block
             self._sum_squares += squares
-        self._largest = max(self._largest, part.largest)
+        self.max_um = max(self.max_um, part.largest)
         self._within += part.within
 
     @property
@@ -122,10 +122,6 @@ class Stream:
     @property
     def rms_um(self) -> float:
         return math.sqrt(self._sum_squares / self.count)
-
-    @property
-    def max_um(self) -> float:
-        return self._largest
 
     @property
     def exact_quantiles(self) -> bool:
@@ -138,7 +134,7 @@ class Stream:
             return float(np.quantile(self._values[: self.count], share))
         assert self._fine is not None  # noqa: S101 - one of both is kept
         index = int(np.searchsorted(np.cumsum(self._fine), share * self.count))
-        return min(float(_fine_centres()[index]), self._largest)
+        return min(float(_fine_centres()[index]), self.max_um)
 
     def histogram(self, edges_um: Array) -> BinCounts:
         """Count the samples in bins with ascending edges, [n + 1], µm."""
@@ -146,14 +142,14 @@ class Stream:
             counts = np.histogram(self._values[: self.count], edges_um)[0]
         else:
             assert self._fine is not None  # noqa: S101
-            centres = np.minimum(_fine_centres(), self._largest)
+            centres = np.minimum(_fine_centres(), self.max_um)
             counts = np.histogram(centres, edges_um, weights=self._fine)[0]
         return BinCounts(edges_um, counts.astype(np.int64))
 
     def display_histogram(self) -> BinCounts:
         """Count the samples in 32 to 81 bins of a round width that start at zero."""
-        width = round_width(self._largest / 80.0)
-        bins = max(1, math.floor(self._largest / width) + 1)
+        width = round_width(self.max_um / 80.0)
+        bins = max(1, math.floor(self.max_um / width) + 1)
         return self.histogram(np.arange(bins + 1, dtype=np.float64) * width)
 
     def mode_um(self) -> float:
@@ -165,11 +161,11 @@ class Stream:
         bins. With 100,000 samples the mode scatters by about 2.5 % of the standard deviation.
         """
         spread = math.sqrt(max(self.rms_um**2 - self.mean_um**2, 0.0))
-        if spread < 1e-9 * max(self._largest, LOWEST_UM):
+        if spread < 1e-9 * max(self.max_um, LOWEST_UM):
             return self.mean_um
         from scipy import ndimage
 
-        edges = np.linspace(0.0, self._largest * (1.0 + 1e-12), _SMOOTH_BINS + 1, dtype=np.float64)
+        edges = np.linspace(0.0, self.max_um * (1.0 + 1e-12), _SMOOTH_BINS + 1, dtype=np.float64)
         bandwidth = spread * self.count ** (-1.0 / 7.0) / edges[1]
         smooth = ndimage.gaussian_filter1d(
             self.histogram(edges).counts.astype(float), bandwidth, mode="constant"

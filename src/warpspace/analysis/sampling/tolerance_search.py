@@ -96,7 +96,7 @@ def build_ensemble(case: Case) -> Ensemble:
     unit = np.concatenate([draws.draw(*block) for block in blocks]).astype(np.float32)
     if plan.reduction == Reduction.SAMPLED:
         parts = [
-            np.broadcast_to(case.responses(case.site.random(*block)), (3, len(keys), block[1]))
+            np.broadcast_to(case.responses(case.random(*block)), (3, len(keys), block[1]))
             for block in blocks
         ]
         stacked = np.concatenate(parts, axis=2).astype(np.float32)
@@ -175,22 +175,6 @@ def _scaled(
     return result
 
 
-def sample_scale(task: Task, half_width: Array, moving: NDArray[np.bool_]) -> float | None:
-    """Compute the largest scale of the moving tolerances on the machines of the ensemble."""
-    none = np.zeros_like(half_width)
-    base = task.ensemble.error_um(task.centre, np.where(moving, 0.0, half_width))
-    move = task.ensemble.error_um(none, np.where(moving, half_width, 0.0))
-    within = scales_within(base.astype(float), move.astype(float), task.limit_um)
-    return largest_scale(within, task.probability)
-
-
-def variance_widths(task: Task) -> Array:
-    """Compute the cheapest proportions for a given variance of E, [K], µm or µrad."""
-    square = task.ensemble.mean_square_gain[task.free]
-    widths = np.cbrt(task.cost[task.free] / square)
-    return task.filled(widths * (0.5 * task.widest / widths.max()))
-
-
 def search_widths(task: Task, step: Callable[[], object]) -> Array | None:
     """Find half widths, [K], of least cost that keep the limit with the probability.
 
@@ -207,10 +191,17 @@ def search_widths(task: Task, step: Callable[[], object]) -> Array | None:
     """
     from scipy import optimize, special
 
-    def exact(widths: Array) -> Array | None:
-        return scaled(task, widths, lambda half, moving: sample_scale(task, half, moving))
+    def sample_scale(half_width: Array, moving: NDArray[np.bool_]) -> float | None:
+        none = np.zeros_like(half_width)
+        base = task.ensemble.error_um(task.centre, np.where(moving, 0.0, half_width))
+        move = task.ensemble.error_um(none, np.where(moving, half_width, 0.0))
+        within = scales_within(base.astype(float), move.astype(float), task.limit_um)
+        return largest_scale(within, task.probability)
 
-    start = exact(variance_widths(task))
+    # the cheapest proportions for a given variance of E
+    cheapest = np.cbrt(task.cost[task.free] / task.ensemble.mean_square_gain[task.free])
+    cheapest = task.filled(cheapest * (0.5 * task.widest / cheapest.max()))
+    start = scaled(task, cheapest, sample_scale)
     if start is None:
         return None
     first = start[task.free]
@@ -251,7 +242,7 @@ def search_widths(task: Task, step: Callable[[], object]) -> Array | None:
     )
     if not np.isfinite(optimum.x).all():
         return start
-    better = exact(task.filled(first * np.exp(optimum.x)))
+    better = scaled(task, task.filled(first * np.exp(optimum.x)), sample_scale)
     return better if better is not None and task.spent(better) < task.spent(start) else start
 
 

@@ -109,13 +109,11 @@ def read_message(raw: object) -> Message | None:
 def _is_fine(message: Message) -> bool:
     if isinstance(message, Events):
         return all(len(v) <= LONGEST_VALUE or name.endswith(LONG) for name, v in message.events)
-    return not isinstance(message, PictureRendered) or _is_picture(message.payload)
-
-
-def _is_picture(payload: bytes) -> bool:
-    if not payload.startswith(PNG_START) or len(payload) < len(PNG_START) + 8:
-        return False
-    return max(struct.unpack_from(">II", payload, len(PNG_START))) <= LARGEST_SIDE_PX
+    if not isinstance(message, PictureRendered):
+        return True
+    start, size = message.payload[: len(PNG_START)], message.payload[len(PNG_START) :][:8]
+    is_png = start == PNG_START and len(size) == 8
+    return is_png and max(struct.unpack(">II", size)) <= LARGEST_SIDE_PX
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,22 +16,17 @@ from viser import _messages as messages
 from websockets.asyncio.server import ServerConnection
 
 
-def send_script(client: ClientHandle, source: str) -> None:
-    """Run JavaScript in the page of one tab.
+def _connection(target: ClientHandle | ViserServer) -> Any:
+    is_server = isinstance(target, ViserServer)
+    return getattr(target, "_websock_server" if is_server else "_websock_connection")
 
-    viser has a message for it and no method; a public `client.run_javascript` would replace this.
+
+def send_script(target: ClientHandle | ViserServer, source: str) -> None:
+    """Run JavaScript in the page of one tab, or in every page as soon as it connects.
+
+    viser has a message for it and no method; a public `run_javascript` would replace this.
     """
-    connection: Any = client._websock_connection  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
-    connection.queue_message(messages.RunJavascriptMessage(source=source))
-
-
-def send_script_to_all(server: ViserServer, source: str) -> None:
-    """Run JavaScript in every page as soon as it connects.
-
-    As for one tab; a public `server.run_javascript` would replace this.
-    """
-    connections: Any = server._websock_server  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
-    connections.queue_message(messages.RunJavascriptMessage(source=source))
+    _connection(target).queue_message(messages.RunJavascriptMessage(source=source))
 
 
 def connection_of(server: ViserServer, client: ClientHandle) -> ServerConnection | None:
@@ -39,8 +34,7 @@ def connection_of(server: ViserServer, client: ClientHandle) -> ServerConnection
 
     Our scripts in the page talk to us by it. A public `client.connection` would replace this.
     """
-    connections: Any = server._websock_server  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
-    return connections._live_connections.get(client.client_id)  # noqa: SLF001
+    return _connection(server)._live_connections.get(client.client_id)  # noqa: SLF001
 
 
 _STARTING = threading.Lock()
@@ -70,8 +64,7 @@ def serve_with(change: Callable[[dict[str, Any]], dict[str, Any]]) -> Generator[
 
 
 def message_buffer(client: ClientHandle) -> Any:
-    connection: Any = client._websock_connection  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
-    return connection.get_message_buffer()
+    return _connection(client).get_message_buffer()
 
 
 def send_at_once(client: ClientHandle) -> None:

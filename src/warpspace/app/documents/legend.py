@@ -56,7 +56,6 @@ def marks(picture: LivePicture) -> list[LegendMark]:
 
 
 def marked(picture: LivePicture) -> dict[str, float]:
-    """Return the marked values by name: statistics of the coloured quantity, and the limit."""
     field, values = picture.field, picture.values
     if picture.component != "norm" or picture.quantity == "uncertainty":
         # statistics of the length do not apply to components
@@ -146,11 +145,9 @@ def numbers_words(picture: LivePicture) -> str:
 
 def place_words(picture: LivePicture) -> str:
     """Format the place of the max: ``at X 275 Y −225 Z −480``."""
-    node, grid = int(np.argmax(picture.field.norm_um)), picture.grid
-    at = {
-        name: float(np.broadcast_to(values, grid.shape).flat[node])
-        for name, values in grid.coordinates.items()
-    }
+    node = np.unravel_index(int(np.argmax(picture.field.norm_um)), picture.shape)
+    positions = picture.grid.coordinates.items()
+    at = {name: float(np.broadcast_to(values, picture.shape)[node]) for name, values in positions}
     axes = formatting.point_axes(picture.drawn_state.scene, at)
     return f"at {formatting.list_axes(axes)}" if axes else ""
 
@@ -226,7 +223,6 @@ def picture_conditions(picture: LivePicture) -> tuple[str, ...]:
 
 
 def faded_words(picture: LivePicture) -> tuple[str, ...]:
-    """Describe the meaning of faded colours, and their share of the volume."""
     if picture.faded is None:
         return ()
     percent = 100.0 * float(picture.grid.weights[picture.faded].sum())

@@ -10,7 +10,7 @@ import contextlib
 import json
 import zlib
 from base64 import b64encode
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.resources import files
 from string import Template
@@ -131,29 +131,19 @@ def _usual_camera(picture: LivePicture) -> CameraMemory:
     return fit_camera(drawn, ASPECT)
 
 
-@contextlib.contextmanager
-def _quiet_console() -> Generator[None]:
-    """Suppress the banner of the server, in a terminal and in a notebook."""
-    console = rich.get_console()
-    quiet, console.quiet = console.quiet, True
-    try:
-        yield
-    finally:
-        console.quiet = quiet
-
-
 def _export(step: PageStep, shapes: Shapes) -> str:
-    with _quiet_console():
+    console = rich.get_console()  # shows a banner of the server, in a terminal and in a notebook
+    with contextlib.ExitStack() as stack:
+        stack.callback(setattr, console, "quiet", console.quiet)
+        console.quiet = True
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-        try:
-            light_scene(server.scene)
-            Nodes(server.scene).draw(shapes)
-            first, camera = server.initial_camera, step.camera
-            first.up, first.fov = camera.up, camera.fov_rad
-            first.position, first.look_at = camera.position, camera.look_at
-            return server.scene.as_html(dark_mode=step.picture.state.shown.dark)
-        finally:
-            server.stop()
+        stack.callback(server.stop)
+        light_scene(server.scene)
+        Nodes(server.scene).draw(shapes)
+        first, camera = server.initial_camera, step.camera
+        first.up, first.fov = camera.up, camera.fov_rad
+        first.position, first.look_at = camera.position, camera.look_at
+        return server.scene.as_html(dark_mode=step.picture.state.shown.dark)
 
 
 def _story_steps(state: AppState, scenes: KnownScenes) -> list[PageStep]:

@@ -2,6 +2,7 @@
 
 import json
 from base64 import b64encode
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,14 +24,7 @@ from warpspace.app.state.leaf import Identity
 from warpspace.bodies.gltf import GltfNode, build_gltf
 from warpspace.geometry.colour import ColourScale
 from warpspace.geometry.surfaces import box_edges, is_thin
-from warpspace.picture.map_mesh import (
-    edge_pieces,
-    grid_pieces,
-    isoline_pieces,
-    line_mesh,
-    map_mesh,
-    map_parts,
-)
+from warpspace.picture import map_mesh
 from warpspace.units import Array
 
 SURFACE = "/box/surface"
@@ -51,7 +45,8 @@ def ghost_dashes(picture: LivePicture) -> Array:
 def surface(picture: LivePicture) -> SceneNode:
     has_lines, without_part = picture.state.look.surface == "grid", picture.state.part.is_empty
     # grid lines would hide a part
-    mesh = line_mesh(picture, grid=without_part) if has_lines else map_mesh(picture)
+    build = partial(map_mesh.line_mesh, grid=without_part) if has_lines else map_mesh.map_mesh
+    mesh = build(picture)
     drawn = mesh.vertices_mm, mesh.triangles, mesh.values
     return coloured_shape(*drawn, picture.scale, mesh.faded)
 
@@ -79,12 +74,14 @@ def box(picture: LivePicture) -> Shapes:
     look, options = picture.state.look, picture.state.shown
     shapes: dict[str, SceneNode | None] = {SURFACE: surface(picture)}
     if look.surface != "grid":
-        shapes["/box/edges"] = lines(edge_pieces(picture), colour(picture, "edge"), 1.8)
+        edges = map_mesh.edge_pieces(picture)
+        shapes["/box/edges"] = lines(edges, colour(picture, "edge"), 1.8)
         if options.grid_lines:
-            shapes["/box/grid"] = lines(grid_pieces(picture), colour(picture, "grid"), 0.7)
+            grid = map_mesh.grid_pieces(picture)
+            shapes["/box/grid"] = lines(grid, colour(picture, "grid"), 0.7)
         if look.isolines or look.pass_fail:
             rgb = ISOLINES[picture.scale.diverging]
-            shapes["/box/isolines"] = lines(isoline_pieces(picture), rgb, 1.4)
+            shapes["/box/isolines"] = lines(map_mesh.isoline_pieces(picture), rgb, 1.4)
     if options.ghost:
         shapes["/ghost"] = lines(ghost_dashes(picture), colour(picture, "ghost"), 1.5)
     return shapes
@@ -106,7 +103,7 @@ class BoxLayer:
         if not only_bent(self._full, picture):
             self._show_all(picture)
             return
-        mesh, scale = map_mesh(picture), picture.scale
+        mesh, scale = map_mesh.map_mesh(picture), picture.scale
         opened = Identity(mesh.triangles), scale.diverging, Identity(picture.grid.nominal_mm)
         if opened != self._opened:
             self._opened = opened
@@ -143,13 +140,13 @@ def only_bent(drawn: LivePicture, picture: LivePicture) -> bool:
 
 def line_facts(picture: LivePicture, vertices_mm: Array) -> dict[str, object]:
     """Return the end points of the lines of a box, and their lifts, for `mesh.js`."""
-    of = map_parts(picture)[0].drawn_of
+    of = map_mesh.map_parts(picture)[0].drawn_of
     number = np.zeros(of.surface.nodes.max() + 1, "<u4")
     number[of.surface.nodes] = np.arange(len(of.surface.nodes))
     lines: dict[str, tuple[str, str]] = {}
     for name, segments, ends in (
-        ("/box/grid", of.grid_segments, grid_pieces(picture)),
-        ("/box/edges", of.edge_segments, edge_pieces(picture)),
+        ("/box/grid", of.grid_segments, map_mesh.grid_pieces(picture)),
+        ("/box/edges", of.edge_segments, map_mesh.edge_pieces(picture)),
     ):
         points = number[segments]
         lifts = ends.reshape(-1, 3) - vertices_mm[points.reshape(-1)]

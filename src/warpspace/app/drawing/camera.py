@@ -55,9 +55,8 @@ class Room:
 
 
 def first_room(page_width: float, page_height: float) -> Room:
-    phone = page_width <= PHONE_PX
-    width = page_width - (0 if phone else COLUMNS_PX)
-    height = page_height * (PHONE_SHARE if phone else 1.0) - TOP_PX
+    columns, share = (0, PHONE_SHARE) if page_width <= PHONE_PX else (COLUMNS_PX, 1.0)
+    width, height = page_width - columns, page_height * share - TOP_PX
     return Room(max(width, LEAST_PX), max(height, LEAST_PX))
 
 

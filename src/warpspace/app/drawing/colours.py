@@ -12,13 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.geometry.colour import (
-    LEVELS,
-    ColourScale,
-    colour_table,
-    linear_to_srgb,
-    srgb_to_linear,
-)
+from warpspace.geometry import colour as scales
 from warpspace.units import Array
 
 Floats = NDArray[np.float32]
@@ -38,7 +32,7 @@ _C, _D, _E = 0.983729, 0.4329510, 0.238081
 
 def inverse_tone_map(srgb: NDArray[np.uint8]) -> Floats:
     """Compute the linear colours that the client maps to sRGB colours."""
-    target = srgb_to_linear(srgb.astype(float) / 255.0) @ np.linalg.inv(_OUT).T
+    target = scales.srgb_to_linear(srgb.astype(float) / 255.0) @ np.linalg.inv(_OUT).T
     # target = (v² + A·v − B) / (C·v² + D·v + E), solved for the positive v
     a, b, c = 1.0 - _C * target, _A - _D * target, -(_B + _E * target)
     v = (-b + np.sqrt(b * b - 4.0 * a * c)) / (2.0 * a)
@@ -48,18 +42,18 @@ def inverse_tone_map(srgb: NDArray[np.uint8]) -> Floats:
 @cache
 def level_colours(*, diverging: bool) -> Floats:
     """Return the vertex colours of all levels of a scale, [LEVELS, 3]."""
-    return inverse_tone_map(colour_table(diverging=diverging))
+    return inverse_tone_map(scales.colour_table(diverging=diverging))
 
 
-def colour_levels(scale: ColourScale, values: Array) -> NDArray[np.uint8]:
-    return np.rint(scale.fraction(values) * (LEVELS - 1)).astype(np.uint8)
+def colour_levels(scale: scales.ColourScale, values: Array) -> NDArray[np.uint8]:
+    return np.rint(scale.fraction(values) * (scales.LEVELS - 1)).astype(np.uint8)
 
 
 @lru_cache(maxsize=64)
 def line_colour(rgb: Rgb) -> NDArray[np.uint8]:
     """Return the bytes of a line that appears in a colour, [3]; nearly exact below 230."""
     linear = np.clip(inverse_tone_map(np.array(rgb, dtype=np.uint8)), 0.0, 1.0)
-    rgb_bytes = np.rint(linear_to_srgb(linear.astype(float)) * 255.0).astype(np.uint8)
+    rgb_bytes = np.rint(scales.linear_to_srgb(linear.astype(float)) * 255.0).astype(np.uint8)
     rgb_bytes.flags.writeable = False  # the same array each time
     return rgb_bytes
 

@@ -18,14 +18,7 @@ from warpspace.field.grid import Grid
 from warpspace.geometry.colour import tick_values
 from warpspace.geometry.surfaces import corners, is_thin
 from warpspace.machine.axes import is_linear, parameter
-from warpspace.picture.formatting import (
-    length_words,
-    list_axes,
-    point_axes,
-    spell_coordinate,
-    spell_factor,
-    u95_behind,
-)
+from warpspace.picture import formatting
 from warpspace.units import MICROMETRE, MINUS, MM_PER_UM, Array
 
 AWAY = 0.13
@@ -37,8 +30,6 @@ LEVER_AT = 0.25  # place of the lever's label between point and frame
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """A text at a point."""
-
     text: str
     at_mm: Array
     # "tick", "axis" (its name), "worst", "corner", "asked", "measured", "name", "note"
@@ -83,7 +74,7 @@ def _axes(of: Identity, away: float) -> tuple[AxisLabels, ...]:
             name = f"{'xyz'[k]} in R"
         first, last = sorted((sign * float(low[k]) + shift, sign * float(high[k]) + shift))
         ticks = tuple(
-            (spell_coordinate(value), foot + sign * (value - shift) * along)
+            (formatting.spell_coordinate(value), foot + sign * (value - shift) * along)
             for value in tick_values(first, last, MAX_TICKS)
         )
         labels.append(
@@ -142,9 +133,9 @@ def _worst(picture: LivePicture) -> Iterator[Label]:
     worst = picture.worst_node
     value = float(picture.values.flat[worst])
     if picture.state.look.worst and value != 0.0:
-        plus_minus = ""
+        plus_minus, u95_um = "", picture.u95_um
         if picture.uncertainty is not None and picture.quantity == "position":
-            plus_minus = u95_behind(None if picture.u95_um is None else picture.u95_um.item(worst))
+            plus_minus = formatting.u95_behind(None if u95_um is None else u95_um.item(worst))
         text = f"max {_spell(value, picture.scale.unit, plus_minus)}"
         yield Label(text, picture.drawn_mm.reshape(-1, 3)[worst], "worst")
 
@@ -156,7 +147,7 @@ def _corners(picture: LivePicture) -> Iterator[Label]:
     is_length = picture.quantity == "position" and picture.component == "norm"
     for node in corners(picture.shape):
         if not (look.worst and is_length and node == picture.worst_node):
-            plus_minus = length_words(uncertainty, int(node))
+            plus_minus = formatting.length_words(uncertainty, int(node))
             text = _spell(float(picture.field.norm_um.flat[node]), plus_minus=plus_minus)
             yield Label(text, picture.drawn_mm.reshape(-1, 3)[node], "corner")
 
@@ -167,8 +158,8 @@ def _point(picture: LivePicture) -> Iterator[Label]:
         return
     explained = explain_point(state, picked, picture.exaggeration)
     length = float(np.linalg.norm(explained.drawn_um))
-    where = list_axes(point_axes(state.scene, explained.at))
-    text = f"{length:.1f}{length_words(explained.uncertainty)} µm at {where}"
+    where = formatting.list_axes(formatting.point_axes(state.scene, explained.at))
+    text = f"{length:.1f}{formatting.length_words(explained.uncertainty)} µm at {where}"
     yield Label(text, explained.drawn_mm, "asked")
     for part in explained.explanation.contributions:
         if part.key != picture.state.lever:
@@ -197,7 +188,7 @@ def _names(picture: LivePicture) -> Iterator[Label]:
         ends = overlay.drawn_mm(picture.exaggeration)[np.unique(overlay.at)]
         largest = np.linalg.norm(overlay.error_um[np.unique(overlay.at)], axis=-1).max()
         text = f"{overlay.of.title}: max {_spell(float(largest))}"
-        factor = spell_factor(picture.exaggeration)
+        factor = formatting.spell_factor(picture.exaggeration)
         yield Label(f"{text}, drawn {factor}", ends[np.argmax(ends[:, 2])])
     moved = picture.moved_traces
     name = chosen_trace(picture)

@@ -24,8 +24,6 @@ Pieces = NDArray[np.float32]  # [S, 2, 3], mm; ends of line segments
 
 @dataclass(frozen=True, slots=True)
 class SceneNode:
-    """One node of the scene."""
-
     add: str  # method of viser's scene that adds it
     constant: Mapping[str, Any]  # a change adds the node again
     assigned: Mapping[str, Any]  # assigned in place; arrays are not changed afterwards

@@ -142,34 +142,27 @@ def with_before(state: AppState, side: Side) -> AppState:
 
 def applied(state: AppState, scene: Scene) -> AppState:
     present = state.scene
-    if (
-        scene.machine.axes != present.machine.axes
-        or scene.workspace.volume_axes != present.workspace.volume_axes
-    ):
+    same_axes = scene.machine.axes == present.machine.axes
+    if not (same_axes and scene.workspace.volume_axes == present.workspace.volume_axes):
         return state.with_scene(scene)
-    fresh = start_state(scene)
-    values = {key: round(value, DIGITS) for key, value in fresh.amplitudes.items()}
-    inactive = {
-        key: value
-        for key, value in state.amplitudes.items()
-        if key in fresh.amplitudes and not state.exclusions.active(key)
-    }
-    start = {key: state.start.get(key, 0.0) for key in fresh.amplitudes}
+    amplitudes: dict[str, float] = {}
+    for key in scene.parameter_keys:
+        stays = key in state.amplitudes and not state.exclusions.active(key)
+        proposed = round(scene.errors.amplitude(key), DIGITS)
+        amplitudes[key] = state.amplitudes[key] if stays else proposed
     return replace(
         state,
         scene=replace(scene, title=present.title, name=present.name),
         loaded=state.origin,
-        amplitudes={**values, **inactive},
-        start=start,
+        amplitudes=amplitudes,
+        start={key: state.start.get(key, 0.0) for key in amplitudes},
         tolerances=scene.tolerances,
     )
 
 
 def with_proposal(state: AppState, scene: Scene, title: str) -> AppState:
-    after = Side(title, applied(plain_state(state), scene))
-    return replace(
-        state, comparison=replace(state.comparison, a=Side(), b=after, pinned=after, shown="b")
-    )
+    b = Side(title, applied(plain_state(state), scene))
+    return replace(state, comparison=replace(state.comparison, a=Side(), b=b, pinned=b, shown="b"))
 
 
 def with_applied(state: AppState, scene: Scene, before: str) -> AppState:

@@ -4,10 +4,10 @@ Grids and first-order responses are cached, since they change only with the scen
 rotary positions and the loop; a slider move is then one matrix-vector product.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -31,10 +31,8 @@ from warpspace.units import Array
 CACHE_BYTES = 400_000_000
 WITHIN_LIMIT = 0.27  # place on the scale of signed values: colour of values within the limit
 TRACE_SAMPLES = 73  # points along a trace: every five degrees of a turn
-T = TypeVar("T")
-Responding: TypeAlias = tuple[T, ErrorBasis]
-"""A grid, or traces of rotary axes, with its first-order response."""
-Response: TypeAlias = tuple[Responding[Grid], tuple[Responding[TraceGroup], ...]]
+Response: TypeAlias = tuple[tuple[Any, ErrorBasis], ...]
+"""A grid, and the traces of rotary axes if any, each with its first-order response."""
 
 
 class LiveModel:
@@ -52,7 +50,7 @@ class LiveModel:
         rotary = state.rotary
         key = _place(state), rotary.off, rotary.own_mm, tuple(rotary.held.items())
         response: Response = self._cache.get(key, lambda: _build(state), _size)
-        (grid, basis), traces = response
+        (grid, basis), *traces = response
         field = self._field(state, grid, basis)
         size = model.picture_size_mm(state.scene, grid)
         factor = model.choose_exaggeration(
@@ -70,31 +68,22 @@ class LiveModel:
         }
         if state.look.pass_fail and (state.component, quantity) == ("norm", "position"):
             common["limit_um"] = state.specification.limit_um
-        volume = model.Picture(**common, grid=grid, field=field, uncertainty=uncertainty)
-        common["colours"] = _chosen_colours(state, volume, basis)
-        return LivePicture(
+        traced = tuple(
+            TraceLines(group, own.nominal_mm, self._field(state, group, own).error_um, factor)
+            for group, own in traces
+        )
+        picture = LivePicture(
             **common,
             grid=grid,
             field=field,
             uncertainty=uncertainty,
             cut=state.look.surface == "cut",
-            slices=tuple(
-                model.Slice(
-                    **common,
-                    grid=plane,
-                    axis=axis,
-                    position_mm=at,
-                    field=on_plane,
-                    uncertainty=self._uncertainty(state, plane, on_plane),
-                )
-                for axis, at, plane, on_plane in self._slices(state)
-            ),
             state=state,
-            traces=tuple(
-                TraceLines(group, own.nominal_mm, self._field(state, group, own).error_um, factor)
-                for group, own in traces
-            ),
+            traces=traced,
         )
+        common["colours"] = _chosen_colours(state, picture, basis)
+        slices = tuple(self._slices(state, common))
+        return replace(picture, colours=common["colours"], slices=slices)
 
     def _uncertainty(
         self, state: AppState, grid: Grid, field: ErrorField
@@ -104,30 +93,32 @@ class LiveModel:
             return None
 
         def build() -> FieldUncertainty | None:
-            return field_uncertainty(
-                scene, field.error_um, grid.coordinates, state.view(), grid.point_mm
-            )
+            at, point_mm = grid.coordinates, grid.point_mm
+            return field_uncertainty(scene, field.error_um, at, state.view(), point_mm)
 
         key = "uncertainty", Identity(grid), _place(state)
-        uncertainty: FieldUncertainty = self._cache.get(key, build, _uncertainty_size)
+        uncertainty = self._cache.get(key, build, lambda built: 3 * built.response.nbytes)
         axes, stated = loop_axes(scene.model, state.loop), uncertainty.errors.keys
         unstated = (key for key, value in state.active.items() if value and key not in stated)
         unknown = [key for key in unstated if parameter(key).axis in axes]
         errors = replace(uncertainty.errors, unknown=tuple(unknown))
         return replace(uncertainty, errors=errors, error_um=field.error_um, shares=grid.weights)
 
-    def _slices(self, state: AppState) -> Iterator[tuple[str, float, Grid, ErrorField]]:
+    def _slices(self, state: AppState, common: Mapping[str, Any]) -> Iterator[model.Slice]:
         scene, workspace = state.scene, state.scene.workspace.moved(state.positions)
 
-        def build(axis: str, at: float) -> Responding[Grid]:
+        def build(axis: str, at: float) -> Response:
             plane = build_slice(scene.model, workspace, axis, at, state.nodes)
-            return plane, grid_basis(scene, plane, state.view())
+            return ((plane, grid_basis(scene, plane, state.view())),)
 
         if state.look.surface == "slices":
             for axis, at in slice_positions(scene, state.look, state.machine).items():
                 key = _place(state), axis, at
-                plane, basis = self._cache.get(key, partial(build, axis, at), _basis_size)
-                yield axis, at, plane, self._field(state, plane, basis)
+                ((plane, basis),) = self._cache.get(key, partial(build, axis, at), _size)
+                field = self._field(state, plane, basis)
+                known = self._uncertainty(state, plane, field)
+                drawn: dict[str, Any] = {**common, "field": field, "uncertainty": known}
+                yield model.Slice(**drawn, grid=plane, axis=axis, position_mm=at)
 
     def _field(self, state: AppState, of: Grid | TraceGroup, basis: ErrorBasis) -> ErrorField:
         """Evaluate a grid or traces: to first order, or the residual error of a compensation table.
@@ -157,16 +148,8 @@ def _place(state: AppState) -> tuple[object, ...]:
     return Identity(state.scene), state.nodes, tuple(state.positions.items()), state.view_key
 
 
-def _uncertainty_size(uncertainty: FieldUncertainty) -> int:
-    return 3 * uncertainty.response.nbytes
-
-
-def _basis_size(responding: Responding[Any]) -> int:
-    return responding[1].position.nbytes + responding[1].orientation.nbytes
-
-
 def _size(response: Response) -> int:
-    return sum(map(_basis_size, (response[0], *response[1])))
+    return sum(basis.position.nbytes + basis.orientation.nbytes for _, basis in response)
 
 
 def _build(state: AppState) -> Response:
@@ -176,12 +159,12 @@ def _build(state: AppState) -> Response:
     points = state.rotary.points_mm(scene)
     groups = build_traces(scene.model, points, positions, TRACE_SAMPLES, state.rotary.held)
 
-    def build_trace_basis(group: TraceGroup) -> ErrorBasis:
+    bases = [grid_basis(scene, grid, state.view())]
+    for group in groups:
         at, point, view = group.coordinates, group.nominal_mm, state.view(group.loop)
-        return build_basis(scene.model, scene.errors, scene.parameter_keys, at, view, point)
-
-    traces = tuple((group, build_trace_basis(group)) for group in groups)
-    return (grid, grid_basis(scene, grid, state.view())), traces
+        keys = scene.parameter_keys
+        bases.append(build_basis(scene.model, scene.errors, keys, at, view, point))
+    return tuple(zip((grid, *groups), bases, strict=True))
 
 
 @dataclass(frozen=True)

@@ -193,7 +193,10 @@ def _read(scene: Scene, raw: Tables, like: definition.Machine) -> tuple[Scene, t
     curves = of_axes(scene.errors.functions, chain.axes)
     errors = ErrorSet({key: curve.without_axes(gone) for key, curve in curves.items()})
     errors = extend_to_ranges(errors, read.model, read.workspace)
-    _check_errors(errors)
+    for key, curve in errors.functions.items():
+        if not abs(curve.amplitude) <= MAX_ERROR:
+            peak = f"{curve.amplitude:g} {parameter(key).unit}"
+            raise OptionError(f"errors.{key} reaches {peak}; expected at most ±{MAX_ERROR:g}")
     same = _frames(like) == _frames(read.machine)
     named = like if same else known_alike(read.machine)
     if named is None:
@@ -210,13 +213,6 @@ def _read(scene: Scene, raw: Tables, like: definition.Machine) -> tuple[Scene, t
     notes = (*scene_notes(machine, read.workspace, errors), *body_notes(machine))
     read = replace(read, model=model, errors=errors, notes=notes, part=scene.part)
     return (scene, ()) if read == scene else (read, tuple(_left_out(scene, gone)))
-
-
-def _check_errors(errors: ErrorSet) -> None:
-    for key, curve in errors.functions.items():
-        if not abs(curve.amplitude) <= MAX_ERROR:
-            peak = f"{curve.amplitude:g} {parameter(key).unit}"
-            raise OptionError(f"errors.{key} reaches {peak}; expected at most ±{MAX_ERROR:g}")
 
 
 def _without(table: Tables, axes: Collection[str]) -> Tables:
@@ -362,7 +358,7 @@ ALIKE = 1e-9  # largest difference of two curves of amplitude 1 that are regarde
 
 def guide_errors(state: AppState, gantry: definition.Gantry) -> tuple[float, float] | None:
     """Return the positioning errors of both guides, µm; None where their curves differ."""
-    if not _alike(*_curves(state, gantry)):
+    if not _alike(state.curve(gantry.positioning_key), state.curve(gantry.rotation_key)):
         return None
     mean = state.amplitudes[gantry.positioning_key]
     half = 0.5 * state.amplitudes[gantry.rotation_key] / gantry.rotation_weight
@@ -377,18 +373,14 @@ def with_guide_error(
         raise OptionError(
             f"guides of {gantry.axis}: their errors have different curves; use the sliders"
         )
-    other, curves = present[1 - guide], _curves(state, gantry)
+    other = present[1 - guide]
     rotation = (value_um - other) * (1.0 if guide else -1.0) * gantry.rotation_weight
-    shape = next((curve for curve in curves if curve.amplitude != 0.0), curves[0])
     values = {gantry.positioning_key: (value_um + other) / 2.0, gantry.rotation_key: rotation}
+    curves = [state.curve(key) for key in values]
+    shape = next((curve for curve in curves if curve.amplitude != 0.0), curves[0])
     for key, amplitude in values.items():
         state = put(edits.with_curve(state, key, shape), f"amplitudes.{key}", repr(amplitude))
     return state
-
-
-def _curves(state: AppState, gantry: definition.Gantry) -> tuple[ErrorFunction, ErrorFunction]:
-    along, about = gantry.positioning_key, gantry.rotation_key
-    return state.curve(along), state.curve(about)
 
 
 def _alike(*curves: ErrorFunction) -> bool:

@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
 
 from warpspace.analysis.commands.contributions import Explanation, PointContribution, explain
 from warpspace.analysis.commands.distance import Distance, DistanceResult
@@ -94,13 +94,14 @@ def _on_surfaces(
         points, triangles, node_of = solid_map(mapped)
         hit = pick_surface(origin, unit, points, triangles)
         if hit is not None:
-            nodes, grid = node_of[hit.vertices], mapped.grid
+            vertices, weights, distance = hit
+            nodes, grid = node_of[vertices], mapped.grid
             at = {
-                name: float(np.broadcast_to(values, grid.shape).reshape(-1)[nodes] @ hit.weights)
+                name: float(np.broadcast_to(values, grid.shape).reshape(-1)[nodes] @ weights)
                 for name, values in grid.coordinates.items()
                 if is_linear(name) or name in grid.axes
             }
-            yield Picked(at), hit.distance
+            yield Picked(at), distance
 
 
 def _on_traces(picture: LivePicture, origin: Array, unit: Array) -> Iterator[tuple[Picked, float]]:
@@ -128,11 +129,9 @@ def pick_line(picture: LivePicture, origin_mm: Array, direction: Array) -> int |
 
 
 def _denser(samples: Array) -> Array:
-    count = samples.shape[1]
-    place = np.linspace(0.0, count - 1.0, (count - 1) * BETWEEN + 1)
-    first = np.minimum(place.astype(int), count - 2)
-    part = (place - first)[:, None]
-    return samples[:, first] * (1.0 - part) + samples[:, first + 1] * part
+    last = samples.shape[1] - 1
+    linear = make_interp_spline(np.arange(last + 1), samples, k=1, axis=1)
+    return linear(np.linspace(0.0, last, last * BETWEEN + 1))
 
 
 def explain_point(state: AppState, picked: Picked, exaggeration: float) -> PointExplanation:
@@ -149,14 +148,13 @@ def explain_point(state: AppState, picked: Picked, exaggeration: float) -> Point
         side = "workpiece" if loop is Loop.WORKPIECE else "tool"
         pose = branch_pose(model, side, coordinates)
         point, shift = transforms.apply(pose, np.asarray(picked.point_mm)), np.zeros(3)
-    explanation = explain(model, scene.errors, coordinates, state.view(loop), point)
-    drawn_um = explanation.error_um
+    view = state.view(loop)
+    explanation = explain(model, scene.errors, coordinates, view, point)
+    nominal, drawn_um = explanation.nominal_mm, explanation.error_um
+    uncertainty = field_uncertainty(scene, drawn_um, coordinates, view, nominal)
     if state.controller is not None:
-        nominal = explanation.nominal_mm
         drawn_um = state.controller.field(coordinates, nominal, scene, loop, nominal).error_um
-    drawn, view = deform(explanation.nominal_mm + shift, drawn_um, exaggeration), state.view(loop)
-    error, nominal = explanation.error_um, explanation.nominal_mm
-    uncertainty = field_uncertainty(scene, error, coordinates, view, nominal)
+    drawn = deform(nominal + shift, drawn_um, exaggeration)
     return PointExplanation(at, loop, explanation, shift, drawn, drawn_um, uncertainty)
 
 
@@ -246,21 +244,14 @@ def _measure_distance(of: Identity) -> tuple[DistanceResult, Array, Array] | Non
 # --- Rays from the camera -------------------------------------------------------------------------
 
 
-class Hit(NamedTuple):
-    """Intersection of a ray with a surface."""
-
-    vertices: NDArray[np.intp]  # [3]; vertex numbers of the triangle
-    # [3]; barycentric weights of the point in it, for values per vertex
-    weights: Array
-    distance: float  # along the ray, in lengths of its direction
-
-
 def pick_surface(
     origin: Array, direction: Array, vertices: Array, triangles: NDArray[np.intp]
-) -> Hit | None:
-    """Find the first of the triangles, [T, 3], on a ray.
+) -> tuple[NDArray[np.intp], Array, float] | None:
+    """Find the first of the triangles, [T, 3], on a ray; None where the ray misses.
 
-    Origin and direction, [3], are in the units of the vertices, [M, 3]; None where the ray misses.
+    Origin and direction, [3], are in the units of the vertices, [M, 3]. Return the vertex numbers
+    of the triangle, [3], the barycentric weights of the point in it, [3], and its distance along
+    the ray, in lengths of the direction.
     """
     a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
     edges = np.stack([b - a, c - a, np.broadcast_to(-direction, a.shape)], axis=-1)
@@ -270,7 +261,7 @@ def pick_surface(
     if not inside.any():
         return None
     at = int(np.argmin(np.where(inside, distance, np.inf)))
-    return Hit(triangles[at], np.array([1.0 - u[at] - v[at], u[at], v[at]]), float(distance[at]))
+    return triangles[at], np.array([1.0 - u[at] - v[at], u[at], v[at]]), float(distance[at])
 
 
 def pick_point(

@@ -21,15 +21,10 @@ from warpspace.field.grid import seen_from_workpiece
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.parts import workpiece
 from warpspace.parts.interpreter import read_program
 from warpspace.parts.program import Program, ToolPath, trace_program
-from warpspace.parts.workpiece import (
-    ActualPoints,
-    Workpiece,
-    evaluate_points,
-    place_workpiece,
-    point_basis,
-)
+from warpspace.parts.workpiece import ActualPoints, Workpiece
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, Array
 
@@ -96,7 +91,7 @@ def _respond(scene: Scene, of: T, made: ActualPoints, at: NDArray[Any]) -> Scene
     pose = np.asarray(branch_pose(scene.model, "workpiece", stand))
     response = np.empty((len(keys), count, 3), np.float32)
     for rows in np.array_split(np.arange(count), -(-count // PIECE) or 1):
-        response[:, rows] = point_basis(scene, made, rows=rows).position @ pose[:3, :3].T
+        response[:, rows] = workpiece.point_basis(scene, made, rows=rows).position @ pose[:3, :3].T
     nominal = transforms.apply(pose, made.point_mm).astype(np.float32)
     made_pose = branch_pose(scene.model, "workpiece", made.coordinates)
     point, turn = transforms.apply(made_pose, made.point_mm), (pose @ transforms.inverse(made_pose))
@@ -116,10 +111,9 @@ def part_overlay(state: AppState) -> SceneOverlay[Workpiece] | None:
         return None
 
     def clamp(scene: Scene) -> SceneOverlay[Workpiece]:
-        part = place_workpiece(mesh, scene, place)
-        return _respond(
-            scene, part, evaluate_points(scene, part.vertices_mm), part.corners.corner_of
-        )
+        part = workpiece.place_workpiece(mesh, scene, place)
+        made = workpiece.evaluate_points(scene, part.vertices_mm)
+        return _respond(scene, part, made, part.corners.corner_of)
 
     return _cached_overlay(state, (Identity(mesh), place), clamp)
 

@@ -12,39 +12,23 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from markupsafe import Markup
 
 from warpspace.analysis.description import Analysis, Change, Result
 from warpspace.analysis.options import Option
 from warpspace.analysis.registry import Entry
-from warpspace.app.browser.html import (
-    EMPTY,
-    button,
-    choice,
-    field,
-    join,
-    number,
-    rows,
-    switch,
-    tag,
-    text_box,
-)
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, field, join, tag, text_box
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
+from warpspace.app.evaluation import compare
 from warpspace.app.evaluation.cache import exclusive_work
-from warpspace.app.evaluation.compare import (
-    applied,
-    plain_state,
-    with_applied,
-    with_proposal,
-    without_table,
-)
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import block_html, result_html
 from warpspace.app.panels.file_dialogs import PLAIN
-from warpspace.app.panels.panel import Context, Job, Jobs, Section
+from warpspace.app.panels.panel import Context, Job, Jobs, Section, actions, alert, details
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import LONGEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
@@ -86,6 +70,12 @@ class AnalysisPanel(Section):
 
     runs_on_open = False
     run_label, run_hint = "Run", ""
+    unsupported: tuple[str, ...] = ()  # options that the page does not offer
+    outcome: AnalysisOutcome | None = None
+    problem: tuple[ResultKey, str] | None = None
+    last_key: ResultKey = ()  # of the last run
+    _applied_key: ResultKey = ()  # of the state after a proposed change was applied
+    _title_prefix = ""
 
     def __init__(self, context: Context, entry: Entry) -> None:
         super().__init__(context)
@@ -94,12 +84,7 @@ class AnalysisPanel(Section):
         sentence = entry.sentence.replace(" of SCENE", "").replace("SCENE", "the machine")
         self.sentence = self.sentence or sentence.rstrip(".")
         self.runs_on_open = self.runs_on_open or entry.task == "understand"
-        self.outcome: AnalysisOutcome | None = None
-        self._applied_key: ResultKey = ()  # of the state after a proposed change was applied
-        self.problem: tuple[ResultKey, str] | None = None
         self._jobs = Jobs(self, self.rerender, self._fail)
-        self.last_key: ResultKey = ()  # of the last run
-        self._title_prefix = ""
 
     @property
     def kind(self) -> type[Analysis]:
@@ -109,11 +94,10 @@ class AnalysisPanel(Section):
     # --- what a subclass may override ------------------------------------------------------------
 
     def options(self) -> Sequence[Option]:
-        """List the options that the page supports."""
-        return [o for o in self.kind.options() if not (o.grammar and o.grammar.is_file)]
+        options = [o for o in self.kind.options() if o.name not in self.unsupported]
+        return [o for o in options if not (o.grammar and o.grammar.is_file)]
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
-        """List the options that apply to the state."""
         return self.options()
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
@@ -143,14 +127,18 @@ class AnalysisPanel(Section):
         """Check if it runs by itself after each change."""
         return self.outcome.took_s < QUICK_S if self.outcome else self.runs_on_open
 
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        """Return fields of the analysis that are no options of the page."""
+        return {}
+
     def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
-        return read_form(self.kind, self.shown_options(state), values, scene)
+        analysis: Any = read_form(self.kind, self.shown_options(state), values, scene)
+        return replace(analysis, **self.inputs(state))
 
     def before_result(self, state: AppState) -> Markup:
         return EMPTY
 
     def headline(self, result: Result) -> Markup:
-        """Render the sentences of the result."""
         # the title of the scene is at the top of the page
         prefix, sentences = self._title_prefix, (b for b in result.blocks() if isinstance(b, str))
         return join(block_html(sentence.removeprefix(prefix)) for sentence in sentences)
@@ -160,14 +148,12 @@ class AnalysisPanel(Section):
         return range(len(self.outcome.cards) if self.outcome else 0)[::-1]
 
     def result_html(self, result: Result) -> Markup:
-        """Render its tables and charts."""
         return result_html(block for block in result.blocks() if not isinstance(block, str))
 
     def actions(self, result: Result, *, stale: bool) -> Markup:
-        """Render the buttons below a result."""
         saves = [button(f"Save {end}", f"{self.name}:save", end) for end in _endings(result)]
         saves.append(button("Add to report", f"{self.name}:report", kind="quiet"))
-        return tag("div", join(saves), class_="ws-actions")
+        return actions(*saves)
 
     # --- the page --------------------------------------------------------------------------------
 
@@ -192,8 +178,7 @@ class AnalysisPanel(Section):
         if outcome is not None and not problem:
             if key == self._applied_key:
                 text = "Applied to the displayed machine. Undo reverts it."
-                parts.append(tag("p", text, role="status"))
-                parts.append(RECORD)
+                parts += [tag("p", text, role="status"), RECORD]
             elif stale and not is_automatic:
                 text = "Out of date: inputs have changed. Run again."
                 parts.append(tag("p", text, class_="ws-stale"))
@@ -213,9 +198,8 @@ class AnalysisPanel(Section):
         return join((*parts, self.options_html(state)))
 
     def problem_html(self, state: AppState) -> Markup:
-        if self.problem is None or self.problem[0] != self.result_key(state):
-            return EMPTY
-        return tag("p", self.problem[1], class_="ws-problem", role="alert")
+        key, text = self.problem or ((), "")
+        return alert(text) if key == self.result_key(state) else EMPTY
 
     def cards_html(self, key: ResultKey) -> Markup:
         outcome, cards = self.outcome, list[Markup]()
@@ -224,14 +208,12 @@ class AnalysisPanel(Section):
         hints = {"Preview": "Compare the result with the current state",
                  "Apply": "Change the errors; the current state becomes A"}  # fmt: skip
         for index in self.offered_changes(outcome.result):
-            buttons = join(
+            buttons = (
                 button(label, f"{self.name}:{label.lower()}", index, hint=hint,
-                       kind="main" if label == "Apply" else "",
-                       disabled=outcome.key != key)
+                       kind="main" if label == "Apply" else "", disabled=outcome.key != key)
                 for label, hint in hints.items()
             )  # fmt: skip
-            row = tag("div", buttons, class_="ws-actions")
-            cards.append(tag("div", outcome.cards[index][1] + row, class_="ws-card"))
+            cards.append(tag("div", outcome.cards[index][1] + actions(*buttons), class_="ws-card"))
         return join(cards)
 
     def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
@@ -243,9 +225,8 @@ class AnalysisPanel(Section):
             _control(f"{self.name}:set.{option.name}", option, values.get(option.name), state.scene)
             for option in options
         )
-        return tag("details", tag("summary", "Options") + form, class_="ws-options",
-                   open=bool(self.problem_html(state)),
-                   data_key=f"{self.name}.options")  # fmt: skip
+        is_open, key = bool(self.problem_html(state)), f"{self.name}.options"
+        return details("Options", form, open=is_open, data_key=key)
 
     # --- events --------------------------------------------------------------------------------
 
@@ -266,8 +247,10 @@ class AnalysisPanel(Section):
                 return state
             if action == "preview":
                 name = change.label if change.label.startswith("after ") else ""
-                return with_proposal(state, change.scene, name or f"after {title}: {change.label}")
-            applied_state = with_applied(state, change.scene, f"before {title}")
+                return compare.with_proposal(
+                    state, change.scene, name or f"after {title}: {change.label}"
+                )
+            applied_state = compare.with_applied(state, change.scene, f"before {title}")
             self._applied_key = self.result_key(applied_state)
             description = change.label
             if description.startswith("after "):
@@ -354,13 +337,13 @@ def _endings(result: Result) -> tuple[str, ...]:
 
 
 def _change_html(state: AppState, change: Change) -> Markup:
-    before_state = without_table(plain_state(state))
-    after_state = applied(before_state, change.scene)
+    before_state = compare.without_table(compare.plain_state(state))
+    after_state = compare.applied(before_state, change.scene)
     moved: list[tuple[float, str]] = []
     for key in {**before_state.amplitudes, **after_state.amplitudes}:
         a, b = (state.amplitudes.get(key, 0.0) for state in (before_state, after_state))
         if abs(b - a) > SAME:
-            line = f"{key} {number(a)} → {number(b)} {parameter(key).unit}"
+            line = f"{key} {html.number(a)} → {html.number(b)} {parameter(key).unit}"
             moved.append((-abs(b - a), line))
     steps = [line for _, line in sorted(moved)] or [change.label]
     lines = [tag("div", tag("b", line)) for line in steps[:MOST_STEPS]]
@@ -372,20 +355,24 @@ def _change_html(state: AppState, change: Change) -> Markup:
     except WarpspaceError:
         return join(lines)
     pairs = (("max", before.max_um, after.max_um), ("mean", before.mean_um, after.mean_um))
-    return join(lines) + rows((name, f"{number(a)} → {number(b)} µm") for name, a, b in pairs)
+    return join(lines) + html.rows(
+        (name, f"{html.number(a)} → {html.number(b)} µm") for name, a, b in pairs
+    )
 
 
 def _control(name: str, option: Option, text: str | None, scene: Scene) -> Markup:
     hint, default = f"{option.about}.", option.default_words
     metavar = option.grammar and option.grammar.metavar
     if option.kind is bool:
-        return switch(name, option.label, hint=hint, on=(text or str(int(option.default))) == "1")
+        return html.switch(
+            name, option.label, hint=hint, on=(text or str(int(option.default))) == "1"
+        )
     if option.choices or metavar == "AXIS":
         keys = option.choices or tuple(scene.machine.axes)
         titles = {key: option.choice_labels.get(key, re.sub("[_-]", " ", key)) for key in keys}
         if not option.default:
             titles = {UNSET: default or "automatic", **titles}
-        control = choice(name, str(option.default or UNSET) if text is None else text, titles)
+        control = html.choice(name, str(option.default or UNSET) if text is None else text, titles)
         return field(option.label, control, name, option.unit, hint)
     if option.low is not None and option.high is not None:
         hint += f" Range: {option.low:g} to {option.high:g}"

@@ -8,17 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from markupsafe import Markup
 
-from warpspace.analysis.blocks import (
-    Bars,
-    Block,
-    Column,
-    Curve,
-    Histogram,
-    Lines,
-    Table,
-    blocks_html,
-)
+from warpspace.analysis import blocks
+from warpspace.analysis.blocks import Bars, Block, Curve, Lines, Table
 from warpspace.app.browser.html import EMPTY, fill, join, number, tag
+from warpspace.app.panels.panel import details, tiny
 from warpspace.bench.base import SMALLEST_DEVIATION, lay_polar
 from warpspace.geometry.colour import tick_values
 from warpspace.units import MINUS, THIN_SPACE, Array, spell_short
@@ -27,6 +20,7 @@ WIDEST = 5  # columns of a table that fit into the column of the page
 MOST_BARS = 10
 WIDE, HIGH = 320.0, 190.0  # of a chart, in its own units
 MARGIN_LEFT, RIGHT, TOP, BOTTOM = 40.0, 8.0, 8.0, 30.0
+INNER = WIDE - MARGIN_LEFT - RIGHT, HIGH - TOP - BOTTOM
 SERIES = 6  # colours of series in the style sheet
 ANGLES = Markup(
     '<path class="ws-faint" d="M-1 0H1M0 -1V1"/><text x="1.02" y=".05">0°</text>'
@@ -55,8 +49,7 @@ def details_html(blocks: Iterable[Block], title: str = "Details") -> Markup:
     if not inner:
         return EMPTY
     wide = tag("div", inner, tabindex=0, role="group", aria_label=title)  # scrolled by keys
-    return tag("details", tag("summary", title) + wide, class_="ws-details",
-               data_key=f"details.{title}")  # fmt: skip
+    return details(title, wide, kind="details", data_key=f"details.{title}")
 
 
 def block_html(block: Block) -> Markup:
@@ -64,9 +57,9 @@ def block_html(block: Block) -> Markup:
         return tag("p", spelt(block))
     if isinstance(block, Lines):
         return lines_html(block)
-    if isinstance(block, Histogram):
+    if isinstance(block, blocks.Histogram):
         return histogram_html(block)
-    return Markup(re.sub(r">-(?=\d)", f">{MINUS}", blocks_html([block])))  # noqa: S704 - escaped
+    return Markup(re.sub(r">-(?=\d)", f">{MINUS}", blocks.blocks_html([block])))  # noqa: S704 - escaped
 
 
 def spelt(sentence: str) -> str:
@@ -84,7 +77,7 @@ def _transposed(table: Table) -> Table:
         return table
     (first, *names), *lines = zip(table.visible_columns, *table.cells(), strict=True)
     form = "s" if all(one.is_number for one, *_ in lines) else ""
-    columns = (Column(first.heading), *(Column(name, form) for name in names))
+    columns = (blocks.Column(first.heading), *(blocks.Column(name, form) for name in names))
     lines = [(" ".join(filter(None, (one.heading, one.unit))), *cells) for one, *cells in lines]
     return replace(table, columns=columns, rows=lines, marks=())
 
@@ -99,7 +92,7 @@ def _first_bars(bars: Bars) -> Markup:
              value=number(value, 2), share=number(100.0 * abs(value) / longest))
         for label, value in zip(bars.rows, values, strict=True) if value is not None
     ]  # fmt: skip
-    head = tag("p", " · ".join(filter(None, (panel.title, panel.unit))), class_="ws-tiny")
+    head = tiny(" · ".join(filter(None, (panel.title, panel.unit))))
     return head + join(lines[:MOST_BARS])
 
 
@@ -112,15 +105,13 @@ class PlotFrame:
 
     def place(self, x: Array | float, y: Array | float) -> Array:
         """Compute points of the drawing, [..., 2]."""
-        across = MARGIN_LEFT + (WIDE - MARGIN_LEFT - RIGHT) * (x - self.x[0]) / (
-            self.x[1] - self.x[0]
-        )
-        down = TOP + (HIGH - TOP - BOTTOM) * (self.y[1] - y) / (self.y[1] - self.y[0])
+        across = MARGIN_LEFT + INNER[0] * (x - self.x[0]) / (self.x[1] - self.x[0])
+        down = TOP + INNER[1] * (self.y[1] - y) / (self.y[1] - self.y[0])
         return np.stack(np.broadcast_arrays(across, down), axis=-1)
 
     def to_scale(self) -> "PlotFrame":
         """Widen one of the axes until a unit is as long on both."""
-        rooms = (self.x, WIDE - MARGIN_LEFT - RIGHT), (self.y, HIGH - TOP - BOTTOM)
+        rooms = (self.x, INNER[0]), (self.y, INNER[1])
         per = max((high - low) / room for (low, high), room in rooms) / 2.0
         x, y = (
             ((low + high) / 2.0 - per * room, (low + high) / 2.0 + per * room)
@@ -129,7 +120,6 @@ class PlotFrame:
         return PlotFrame(x, y)
 
     def axes(self, x_label: str, y_label: str) -> Markup:
-        """Draw ticks with their values, and the labels of the axes."""
         floor, middle = HIGH - BOTTOM, (TOP + HIGH - BOTTOM) / 2.0
         parts = [_text(x_label, (MARGIN_LEFT + WIDE - RIGHT) / 2.0, HIGH - 4),
                  _text(y_label, 9, middle, transform=f"rotate(-90 9 {middle:.0f})")]  # fmt: skip
@@ -168,8 +158,7 @@ def lines_html(chart: Lines) -> Markup:
     return _figure(chart, frame.axes(chart.x_label, chart.y_label) + curves)
 
 
-def histogram_html(chart: Histogram) -> Markup:
-    """Draw a distribution with its limit."""
+def histogram_html(chart: blocks.Histogram) -> Markup:
     limit = math.inf if chart.limit is None else chart.limit
     ends = float(chart.edges[0]), max(float(chart.edges[-1]), chart.limit or 0.0)
     frame = PlotFrame(ends, (0.0, max(float(chart.heights.max()), 1e-9) * 1.05))
@@ -198,7 +187,7 @@ def _figure(
     key = join(
         tag("span", one.name, class_=f"ws-s{one.colour % SERIES} ws-{one.style}") for one in named
     )
-    note = tag("p", chart.note, class_="ws-tiny") if chart.note else EMPTY
+    note = tiny(chart.note) if chart.note else EMPTY
     svg = _svg(inner, f"{chart.title}: {chart.y_label}", box, kind)
     key = tag("div", join((key, rings)), class_="ws-key ws-tiny")
     return tag("figure", tag("figcaption", chart.title) + svg + key + note)

@@ -7,13 +7,14 @@ follow them; `AppState.origin` holds those of the scene.
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 from markupsafe import Markup
 
 from warpspace.app.browser.html import EMPTY, button, field, fill, join, number, tag, text_box
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.panel import Section
+from warpspace.app.panels.panel import Section, actions, details, tiny
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import linear_spans
@@ -23,7 +24,6 @@ from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, evaluate_first_order
 from warpspace.field.grid import build_grid
 from warpspace.kinematics import conversion, transforms
-from warpspace.kinematics.axis_errors import AxisErrors
 from warpspace.kinematics.chain import branch_frames, nominal_point
 from warpspace.kinematics.model import Loop, Model, convention_names, find_convention
 from warpspace.machine.axes import TravelDirection, is_linear, parameter
@@ -79,8 +79,7 @@ def choice_groups(scene: Scene) -> dict[tuple[str, str], dict[str, str]]:
         },
     }
     for kind, moves in (("Rotary", "turns"), ("Linear", "moves")):
-        hint = f"+1 {moves} in the direction of the axis name, −1 against it"
-        groups[f"{kind} axes", hint] = {
+        groups[f"{kind} axes", f"+1 {moves} in the direction of the axis name, −1 against it"] = {
             f"direction {axis}={sign}": f"{axis} {label}"
             for axis in sorted(scene.machine.axes)
             if is_linear(axis) == (kind == "Linear")
@@ -94,7 +93,6 @@ def choices(scene: Scene) -> list[str]:
 
 
 def chosen(scene: Scene) -> set[str]:
-    """Return the choices in force."""
     return {
         f"component_errors={scene.model.component_errors}",
         "reference=absolute" if scene.reference is None else "reference=point",
@@ -115,8 +113,7 @@ def with_choice(state: AppState, choice: str) -> AppState:
         return _with_scene(state, changed)
     axis = model.machine.axes[group.removeprefix("direction ")]
     axes = {**model.machine.axes, axis.name: replace(axis, direction=int(chosen_value))}
-    machine = replace(model.machine, axes=axes)
-    return _with_scene(state, replace(model, machine=machine))
+    return _with_scene(state, replace(model, machine=replace(model.machine, axes=axes)))
 
 
 def with_own_conventions(state: AppState) -> AppState:
@@ -141,9 +138,8 @@ def with_own_conventions(state: AppState) -> AppState:
 def effects_of(state: AppState) -> dict[str, Effect]:
     """Compute the effect of each single choice on the map; "all" are those in force."""
     base = with_own_conventions(state)
-    variants = {choice: with_choice(base, choice) for choice in choices(base.scene)} | {
-        "all": state
-    }
+    variants = {choice: with_choice(base, choice) for choice in choices(base.scene)}
+    variants["all"] = state
     if state.scene.reference is not None:
         variants["reference=point"] = with_reference(base, state.scene.reference)
     (weights, before), in_force = _error(base), chosen(base.scene)
@@ -154,8 +150,7 @@ def effects_of(state: AppState) -> dict[str, Effect]:
 
 
 def _error(state: AppState) -> tuple[Array, Array]:
-    workspace = state.scene.workspace.moved(state.positions)
-    grid = build_grid(state.scene.model, workspace, state.nodes)
+    grid = build_grid(state.scene.model, state.scene.workspace.moved(state.positions), state.nodes)
     return grid.weights, evaluate_grid(state.active_scene(), grid, state.view()).error_um
 
 
@@ -206,9 +201,8 @@ def _changes(scene: Scene) -> dict[str, dict[str, ErrorFunction]]:
             value_in_middle = errors.evaluate_at(row.key, middle, scene.model.direction)
             changes["zero_at"][row.key] = Constant(span, -float(value_in_middle))
             if axis.is_linear and not row.is_rotation and row.direction != axis.index:
-                at = conversion.line_positions(
-                    AxisErrors(scene.model, errors, row.axis, span), row.key
-                )
+                axis_errors = conversion.AxisErrors(scene.model, errors, row.axis, span)
+                at = axis_errors.line_positions(row.key)
                 for line in conversion.ReferenceLine:
                     offset, slope = conversion.fit_line(at, errors.evaluate(row.key, at), line)
                     changes[line][row.key] = Poly(span, (-offset, -slope))
@@ -221,10 +215,8 @@ def _measured_in_the_middle(scene: Scene) -> ErrorSet:
     middle = {axis: np.asarray(at) for axis, at in scene.workspace.positions.items()}
     point = nominal_point(model, Loop.TOOL, middle)
     lines: dict[str, Vector] = {}
-    for frames in (
-        *branch_frames(model, "tool", middle),
-        *branch_frames(model, "workpiece", middle),
-    ):
+    branches = (branch_frames(model, branch, middle) for branch in ("tool", "workpiece"))
+    for frames in chain(*branches):
         if frames.axis.is_linear:
             x, y, z = transforms.apply(transforms.inverse(frames.after), point).tolist()
             lines[frames.axis.name] = (x, y, z)
@@ -284,8 +276,8 @@ class ConventionsSection(Section):
         lines.append(_row("all choices together", effects["all"]))
         reset = button("Reset to the scene", "conventions:own", disabled=in_force == scene_choices)
         return join((
-            tag("table", join(lines), class_="ws-choices-table"), tag("p", NOTE, class_="ws-tiny"),
-            _reference(state), tag("div", reset, class_="ws-actions"), _wrong(state),
+            tag("table", join(lines), class_="ws-choices-table"), tiny(NOTE),
+            _reference(state), actions(reset), _wrong(state),
         ))  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -313,7 +305,7 @@ def _reference(state: AppState) -> Markup:
     box = field("Reference point", text_box(name, text), name, hint="Axis positions")
     nowhere = state.picked is None or state.picked.point_mm is not None
     pick = button("Use the clicked point", "conventions:pick", hint=hint, disabled=nowhere)
-    return box + tag("div", pick, class_="ws-actions")
+    return box + actions(pick)
 
 
 def _row(label: object, effect: Effect | None) -> Markup:
@@ -326,6 +318,5 @@ def _wrong(state: AppState) -> Markup:
     scene = state.active_scene()
     costs = convention_costs(scene, scene.view(state.loop), state.nodes)
     rows = [_row(label, costs.get(name)) for name, label in COSTS.items()]
-    summary = tag("summary", "Effect of data measured in another convention")
-    note = tag("p", COST_NOTE, class_="ws-tiny")
-    return tag("details", join((summary, note, tag("table", join(rows)))), class_="ws-options")
+    heading = "Effect of data measured in another convention"
+    return details(heading, tiny(COST_NOTE), tag("table", join(rows)))

@@ -10,29 +10,19 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.blocks import Histogram
-from warpspace.analysis.description import Analysis, Result
+from warpspace.analysis.description import Result
 from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.options import Option, read_numbers
 from warpspace.analysis.sampling.cases import Case, Reduction, SamplingPlan
 from warpspace.analysis.sampling.distribution import Distribution, Draws, Probability, Stream
 from warpspace.analysis.sampling.tolerance_search import Ensemble, build_ensemble
-from warpspace.app.browser.html import (
-    EMPTY,
-    button,
-    choice,
-    fill,
-    join,
-    number,
-    rows,
-    slider,
-    tag,
-    text_box,
-)
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, fill, join, number, tag
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.machine_edits import library
 from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import histogram_html
-from warpspace.app.panels.panel import setting
+from warpspace.app.panels.panel import alert, setting, tiny
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.leaf import Identity
@@ -89,18 +79,18 @@ class TolerancesPanel(AnalysisPanel):
     def is_automatic(self, state: AppState) -> bool:
         return False  # it would change tolerances by itself
 
-    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
         """Allocate for the limit of the state; fixed keys of another machine are ignored."""
-        analysis: Any = super().build_analysis(state, values, scene)
         specification, keys = state.specification, state.amplitudes.keys()
         fixed = specification.fixed & keys
         costs_by_key = read_numbers(specification.costs, "", "") if specification.costs else {}
         costs = tuple((k, cost) for k, cost in costs_by_key.items() if k in keys and k not in fixed)
-        return replace(
-            analysis, limit_um=specification.limit_um, probability=specification.percent / 100.0,
-            loop=state.loop, over=specification.over, distribution=specification.distribution,
-            costs=costs, fixed=tuple(sorted(fixed)), samples=SAMPLES, workers=1,
-        )  # fmt: skip
+        return {
+            "limit_um": specification.limit_um, "probability": specification.percent / 100.0,
+            "loop": state.loop, "over": specification.over,
+            "distribution": specification.distribution, "costs": costs,
+            "fixed": tuple(sorted(fixed)), "samples": SAMPLES, "workers": 1,
+        }  # fmt: skip
 
     def _accept_outcome(self, outcome: AnalysisOutcome) -> None:
         super()._accept_outcome(outcome)
@@ -124,7 +114,7 @@ class TolerancesPanel(AnalysisPanel):
         try:
             return controls + self._probability(sample_machines(state), state)
         except WarpspaceError as error:
-            return controls + tag("p", str(error), class_="ws-problem", role="alert")
+            return controls + alert(str(error))
 
     def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
         controls = _controls(state, "over", "distribution", "costs")
@@ -151,7 +141,7 @@ class TolerancesPanel(AnalysisPanel):
             f" largest {number(stream.max_um)} µm; {spell_count(stream.count)} machines,"
             f" 95 % confidence {percent(probability.low)} … {percent(probability.high)} %"
         )
-        return headline + histogram_html(chart) + tag("p", numbers, class_="ws-tiny")
+        return headline + histogram_html(chart) + tiny(numbers)
 
     def _rows(self, ensemble: Ensemble, state: AppState) -> Markup:
         shares = tolerance_shares(ensemble, state.tolerances)
@@ -191,9 +181,9 @@ def _row(state: AppState, key: str, share: float, longest: float) -> Markup:
         "{unit}</span>{fixed}</div></div>",
         name=name, code=key, words=row.name, share=number(100.0 * share),
         length=f"{100.0 * share / longest:.1f}", unit=row.unit,
-        slider=slider(name, width, span.low, span.high, span.step, twin=name,
+        slider=html.slider(name, width, span.low, span.high, span.step, twin=name,
                       label=f"Half-width of {key}", text=f"±{width:g} {row.unit}"),
-        box=text_box(name, spell_typed(width), label=f"Half-width of {key} in {row.unit}",
+        box=html.text_box(name, spell_typed(width), label=f"Half-width of {key} in {row.unit}",
                      size="short", inputmode="decimal"),
         fixed=button("fixed" if is_fixed else "fix", "state:set.specification.fixed",
                      f"{'-' if is_fixed else '+'}{key}", kind="link", pressed=is_fixed,
@@ -210,8 +200,6 @@ def _sampled(state: AppState) -> ResultKey:
 
 
 def sample_machines(state: AppState) -> Ensemble:
-    """Sample machines for the tolerances of a state."""
-
     def build() -> Ensemble:
         scene, specification = state.resulting_scene(), state.specification
         keys = loop_keys(scene.model, state.loop, scene.parameter_keys)
@@ -252,7 +240,6 @@ def estimate(
 
 
 def tolerance_shares(ensemble: Ensemble, tolerances: ToleranceSet) -> dict[str, float]:
-    """Compute the share of each tolerance in the variance of the error."""
     _, half_widths = _centres_and_widths(ensemble, tolerances)
     variances = half_widths**2 * ensemble.mean_square_gain
     shares = variances / (float(variances.sum()) or 1.0)
@@ -269,6 +256,7 @@ class ConceptsPanel(AnalysisPanel):
     """Machines side by side: chosen by title, compared as soon as there are two."""
 
     runs_on_open = True
+    unsupported = ("workers",)
 
     def offers(self, state: AppState) -> dict[str, Scene]:
         """Return the machines that can be compared, by title."""
@@ -284,9 +272,6 @@ class ConceptsPanel(AnalysisPanel):
         text = state.forms.get(f"{self.name}.machines", PRESENT)
         return [key for key in text.split("\n") if key][:MOST_CONCEPTS]
 
-    def options(self) -> Sequence[Option]:
-        return [option for option in super().options() if option.name != "workers"]
-
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {"limit_um": f"{state.specification.limit_um:g}", "samples": str(SAMPLES)}
 
@@ -297,9 +282,8 @@ class ConceptsPanel(AnalysisPanel):
     def is_ready(self, state: AppState) -> bool:
         return len(self.scenes(state)) > 1  # links may name unknown machines
 
-    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
-        analysis: Any = super().build_analysis(state, values, scene)
-        return replace(analysis, workers=1)  # leaves threads to the sliders
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        return {"workers": 1}  # leaves threads to the sliders
 
     def result_key(self, state: AppState) -> ResultKey:
         return (
@@ -321,9 +305,9 @@ class ConceptsPanel(AnalysisPanel):
                 title, buttons = key, open_button + remove_button
             lines.append((tag("b", f"{letter} ") + title, buttons))
         remaining = {key: key for key in offers if key not in chosen}
-        add = choice(f"{self.name}:set.add", "", {"": ADD, **remaining},
+        add = html.choice(f"{self.name}:set.add", "", {"": ADD, **remaining},
                      label="Compare with another machine")  # fmt: skip
-        machines = rows(lines) if self.is_ready(state) else EMPTY
+        machines = html.rows(lines) if self.is_ready(state) else EMPTY
         return (add if len(chosen) < MOST_CONCEPTS else EMPTY) + machines
 
     def actions(self, result: Result, *, stale: bool) -> Markup:
@@ -341,10 +325,8 @@ class ConceptsPanel(AnalysisPanel):
         elif action == "remove" and value in chosen:
             chosen.remove(value)
         elif action == "open" and value in offers and value != PRESENT:
-            opened = start_state(offers[value])
-            self.context.call_soon(
-                partial(self.context.show_opened, opened, None, keeps_comparison=True)
-            )
+            show = partial(self.context.show_opened, keeps_comparison=True)
+            self.context.call_soon(partial(show, start_state(offers[value]), None))
             return state
         elif action == "sheet":
             self._draw(state)
@@ -364,4 +346,4 @@ class ConceptsPanel(AnalysisPanel):
             "Drawing the machines",
             lambda job: draw(scenes, result.analysis, dark, job),
             partial(self.context.save_file, "concepts.png"),
-        )  # fmt: skip
+        )

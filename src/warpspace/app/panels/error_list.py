@@ -12,23 +12,11 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.blocks import Band, Curve, Lines
-from warpspace.app.browser.html import (
-    EMPTY,
-    button,
-    choice,
-    field,
-    fill,
-    ident,
-    join,
-    number,
-    rows,
-    slider,
-    tag,
-    text_box,
-)
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, fill, join, tag
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import lines_html
-from warpspace.app.panels.panel import Context, Panel, Refresh
+from warpspace.app.panels.panel import Context, Panel, Refresh, actions, quiet, tiny
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import amplitude_span
@@ -117,15 +105,12 @@ TYPING = (
 
 @dataclass(frozen=True, slots=True)
 class CurveEditFeedback:
-    """Feedback on an edited curve."""
-
     text: str  # rows as typed or read
     message: str
     is_problem: bool
 
 
 def curve_html(state: AppState, key: str, feedback: CurveEditFeedback | None) -> Markup:
-    """Render chart, origin and editor of an error."""
     row, function = parameter(key), state.curve(key)
     only, excluded = key in state.exclusions.only, key in state.exclusions.excluded
     origin, is_edited = origin_words(state, key)
@@ -136,14 +121,14 @@ def curve_html(state: AppState, key: str, feedback: CurveEditFeedback | None) ->
     feedback = feedback or CurveEditFeedback(spell_rows(function), "", is_problem=False)
     return tag("div", join((
         _chart(state, row, function),
-        rows([("Origin", origin + reset)], "ws-origin"),
+        html.rows([("Origin", origin + reset)], "ws-origin"),
         _editor(row, function, feedback),
-        tag("div", join((
+        actions(
             button("Only this error", "state:set.exclusions.only", f"{'-' if only else '+'}{key}",
                    pressed=only, hint="Evaluate the machine with the errors selected here only"),
             button("Exclude", "state:set.exclusions.excluded", f"{'-' if excluded else '+'}{key}",
                    pressed=excluded, hint="Evaluate the machine without this error"),
-        )), class_="ws-actions"),
+        ),
     )), class_="ws-error-more", data_key=f"more-{key}")  # fmt: skip
 
 
@@ -152,9 +137,10 @@ def _editor(row: Parameter, function: ErrorFunction, feedback: CurveEditFeedback
     titles = [Constant.title] if row.is_constant else kind_titles()
     if not function.edited_as_rows:
         titles.append(function.title)
-    fields = field("Curve", choice(kind, function.title, {title: title for title in titles}), kind)
+    kinds = html.choice(kind, function.title, dict(zip(titles, titles, strict=True)))
+    fields = html.field("Curve", kinds, kind)
     if not function.edited_as_rows:
-        return fields + tag("p", columns[0].upper() + columns[1:] + ".", class_="ws-tiny")
+        return fields + tiny(columns[0].upper() + columns[1:] + ".")
     text, is_problem, message = feedback.text, feedback.is_problem, EMPTY
     if feedback.message:
         message = tag("p", feedback.message, class_="ws-problem" if is_problem else "ws-quiet",
@@ -163,7 +149,7 @@ def _editor(row: Parameter, function: ErrorFunction, feedback: CurveEditFeedback
         '<textarea id="{id}" class="ws-box ws-rows-box" data-set="{name}" rows="{count}"'
         ' spellcheck="false" aria-label="{label}" aria-invalid="{invalid}" title="{hint}">'
         '\n{text}</textarea><p class="ws-tiny">{columns}</p>{message}',
-        id=ident(name), name=name, count=min(max(text.count("\n") + 1, 2), 8), text=text,
+        id=html.ident(name), name=name, count=min(max(text.count("\n") + 1, 2), 8), text=text,
         label=f"Numbers of {row.key}: {columns}", hint=TYPING, invalid=str(is_problem).lower(),
         columns=f"{columns}, in {row.unit}", message=message,
     )  # fmt: skip
@@ -245,7 +231,6 @@ def _finite(values: Array) -> Array:
 
 
 def describe_curve(name: str, unit: str, along: str, at: Array, value: Array) -> str:
-    """Describe the curve of an error for screen readers."""
     if np.ptp(value) == 0.0:
         return f"{name}: {spell(float(value[0]))} {unit} everywhere"
     ends = (0, len(at) - 1)
@@ -335,10 +320,9 @@ class ErrorsPanel(Panel):
         effects = {key: gains.get(key, 0.0) * abs(at) for key, at in state.amplitudes.items()}
         order = tuple(sorted(effects, key=lambda key: -effects[key]))
         largest, used = max(effects.values(), default=0.0) or 1.0, used_keys(state)
-        self._edited = set()
-        ranking = Ranking(inputs, gains, state.amplitudes, order, used, largest, _spans(state))
-        self._ranking = ranking
-        return ranking
+        self._edited, spans = set(), _spans(state)
+        self._ranking = Ranking(inputs, gains, state.amplitudes, order, used, largest, spans)
+        return self._ranking
 
     def _render_rows(
         self, state: AppState, ranking: Ranking, gains: Mapping[str, float]
@@ -354,11 +338,11 @@ class ErrorsPanel(Panel):
                 span = ranking.spans[key] = amplitude_span(key, value, None)
             effect, row = gains.get(key, 0.0) * abs(value), parameter(key)
             share, active = min(effect / ranking.largest, 1.0), state.exclusions.active(key)
-            html = _row(row, value, span, effect if active else None, share,
-                        state.curve(key).slider_words(row.axis))  # fmt: skip
+            hint = state.curve(key).slider_words(row.axis)
+            row_html = _row(row, value, span, effect if active else None, share, hint)
             if key == state.page.row:
-                html += curve_html(state, key, self._feedback.get(key))
-            rows_html[key] = value, html
+                row_html += curve_html(state, key, self._feedback.get(key))
+            rows_html[key] = value, row_html
         return {f"error.{key}": rows_html[key][1] for key in ranking.order}
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -371,11 +355,11 @@ class ErrorsPanel(Panel):
             self._feedback = {**self._feedback, key: feedback}
             self.context.call_soon(self.rerender)  # also if the edit is refused
             return state
-        if command in ("sort", "find"):
-            self._ranking = None
         if command == "sort":
+            self._ranking = None
             self.context.call_soon(self.rerender)
         if command == "find":
+            self._ranking = None
             return replace(state, page=replace(state.page, query=value[:LONGEST_QUERY]))
         if command == "row":
             row = value if value in state.amplitudes and value != state.page.row else ""
@@ -391,7 +375,7 @@ def _list_html(state: AppState, ranking: Ranking) -> str:
     is_open = FOLDED in state.page.open or not listed
     places = _places(listed, state.page.row)
     if query.strip() and not listed:
-        places = tag("p", "No matching errors.", class_="ws-quiet")
+        places = quiet("No matching errors.")
     elif zero:
         title = tag("div", f"{len(zero)} errors are zero",
                     data_do="page:fold", data_value=FOLDED, id="ws-error-zero")  # fmt: skip
@@ -407,7 +391,7 @@ def _list_html(state: AppState, ranking: Ranking) -> str:
         count = sum(not state.exclusions.active(key) for key in used)
         excluded = (f"{count} of {len(used)} errors excluded. ",
                     button("Include all", "page:include", kind="link"))  # fmt: skip
-    find = text_box(
+    find = html.text_box(
         "errors:find", query, placeholder="Find an error  /", live=True, label="Find an error",
         id="ws-find",
     )  # fmt: skip
@@ -419,7 +403,7 @@ def _list_html(state: AppState, ranking: Ranking) -> str:
         menu = tag("details", summary + tag("div", buttons), class_="ws-menu")
     head = tag("div", find + menu, class_="ws-find")
     body = tag("div", places, class_="ws-errors", data_leave="errors:sort")
-    return head + tag("p", join(excluded), class_="ws-quiet") + body
+    return head + quiet(join(excluded)) + body
 
 
 def _places(keys: list[str], row: str) -> Markup:
@@ -446,10 +430,10 @@ def _row(
         ' data-label="{key} in {unit}">{text}</span><span class="ws-unit">{unit}</span></div>',
         kind="ws-error-head off" if effect is None else "ws-error-head", key=key, name=name,
         symbol=row.symbol, quantity=row.kind.value, title=row.name, unit=row.unit,
-        effect="–" if effect is None else number(effect), share=f"{100.0 * share:.1f}",
+        effect="–" if effect is None else html.number(effect), share=f"{100.0 * share:.1f}",
         typed=spell_typed(value), text=text,
         hint=f"{row.name}: {hint}. Drag, or type a number.",
-        slider=slider(name, value, span.low, span.high, span.step, twin=f"box-{key}",
+        slider=html.slider(name, value, span.low, span.high, span.step, twin=f"box-{key}",
                       label=f"{key} {row.name}", text=f"{text} {row.unit}"),
     )  # fmt: skip
 
@@ -488,8 +472,6 @@ _NEAR = 0.75
 def find_parameters(query: str, keys: Sequence[str]) -> tuple[str, ...]:
     parts = fold(query[:LONGEST_QUERY]).split()
     tokens = [part for part in parts if part not in _FILLER] or parts
-    if not tokens:
-        return tuple(keys)
     rows = [parameter(key) for key in keys]
     exact = tuple(row.key for row in rows if all(_fits(token, row) for token in tokens))
     if exact:

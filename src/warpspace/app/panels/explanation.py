@@ -9,43 +9,27 @@ from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.analysis.commands.contributions import PointContribution
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.analysis.uncertainty.propagation import NAMES
-from warpspace.app.browser.html import (
-    EMPTY,
-    button,
-    field,
-    join,
-    number,
-    rows,
-    signed,
-    tag,
-    text_box,
-)
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, join, number, rows, signed, tag
 from warpspace.app.drawing.camera import fit_camera
+from warpspace.app.evaluation import point_explanation
 from warpspace.app.evaluation.compare import without_words
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import (
     POINTS,
     PointExplanation,
-    awaited_form,
     explain_point,
-    measure_distance,
     pick_worst,
-    with_picked,
 )
 from warpspace.app.panels.analysis_panel import AnalysisPanel
 from warpspace.app.panels.block_html import block_html
-from warpspace.app.panels.panel import Section, actions
+from warpspace.app.panels.panel import Section, actions, details, quiet, tiny
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.tree import EXAMPLE, put
 from warpspace.field.evaluate import placed_words
 from warpspace.machine.axes import parameter
-from warpspace.picture.formatting import (
-    LOOP_WORDS,
-    length_words,
-    spell_axes,
-    spell_in_r,
-    u95_behind,
-)
+from warpspace.picture import formatting
+from warpspace.picture.formatting import length_words
 from warpspace.scene.model import evaluate_grid
 from warpspace.units import spell_count
 
@@ -73,7 +57,7 @@ class WorstPanel(Section):
 
     def body(self, picture: LivePicture) -> Markup:
         if picture.is_difference:
-            return tag("p", DIFFERENCE, class_="ws-quiet")
+            return quiet(DIFFERENCE)
         explanation, controls = self._explain(picture), EMPTY
         if picture.state.picked is not None:
             reset = button("Worst point", "worst:forget", kind="link",
@@ -83,30 +67,28 @@ class WorstPanel(Section):
             controls = tag("p", join((_axes(explanation), " ", reset, " ", pin)))
         best = tag("div", "", data_piece="best")
         limit = picture.state.specification.limit_um
-        details = tag("summary", "Details") + _details(explanation, picture.state.lever)
-        details = tag("details", details, class_="ws-details", data_key="worst.details")
+        table = _details(explanation, picture.state.lever)
         return join((
-            controls, _contributions(explanation), _uncertainty(explanation, limit), best, details,
+            controls, _contributions(explanation), _uncertainty(explanation, limit), best,
+            details("Details", table, kind="details", data_key="worst.details"),
         ))  # fmt: skip
 
     def _explain(self, picture: LivePicture) -> PointExplanation:
         if self._explanation is None or self._explanation[0] is not picture:
             picked = picture.state.picked or pick_worst(picture)
-            self._explanation = (
-                picture,
-                explain_point(picture.drawn_state, picked, picture.exaggeration),
-            )
+            explanation = explain_point(picture.drawn_state, picked, picture.exaggeration)
+            self._explanation = picture, explanation
         return self._explanation[1]
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action == "set.at":
             return put(state, "picked", value)
         if action == "forget":
-            return with_picked(state, None)
+            return point_explanation.with_picked(state, None)
         if action == "lever" and value in state.amplitudes:
             picture = self.context.picture
             if state.picked is None and picture is not None:
-                state = with_picked(state, pick_worst(picture))
+                state = point_explanation.with_picked(state, pick_worst(picture))
             return replace(state, lever="" if value == state.lever else value)
         if action == "back":
             self.context.call_soon(self._show_lever)
@@ -117,8 +99,7 @@ class WorstPanel(Section):
         if picture is None or picture.state.picked is None or picture.is_difference:
             return
         explanation = self._explain(picture)
-        contributions = explanation.explanation.contributions
-        origins = [c.origin_mm + explanation.shift_mm for c in contributions
+        origins = [c.origin_mm + explanation.shift_mm for c in explanation.explanation.contributions
                    if c.key == picture.state.lever]  # fmt: skip
         if origins:
             points = np.concatenate([picture.drawn_mm.reshape(-1, 3), np.stack(origins)])
@@ -128,7 +109,7 @@ class WorstPanel(Section):
 
 
 def _axes(explanation: PointExplanation) -> str:
-    return spell_axes(explanation.at).removeprefix("axes ")
+    return formatting.spell_axes(explanation.at).removeprefix("axes ")
 
 
 def _contributions(explanation: PointExplanation) -> Markup:
@@ -143,7 +124,7 @@ def _contributions(explanation: PointExplanation) -> Markup:
         label = f"{n_others} more" if n_others else "second order"
         lines.append((tag("span", label, class_="ws-quiet"), signed(remainder_um)))
     if not lines:
-        return tag("p", "No error acts at this point.", class_="ws-quiet")
+        return quiet("No error acts at this point.")
     note = EMPTY
     if explanation.is_corrected:
         residual = number(float(np.linalg.norm(explanation.drawn_um)))
@@ -159,7 +140,7 @@ def _uncertainty(explanation: PointExplanation, limit_um: float) -> Markup:
     uncertainty = explanation.uncertainty
     if uncertainty is None or not uncertainty.errors.is_known:
         remarks = [] if uncertainty is None else uncertainty.errors.remarks()
-        return join(tag("p", remark, class_="ws-tiny") for remark in remarks)
+        return join(tiny(remark) for remark in remarks)
     variances = uncertainty.variance_shares(uncertainty.response @ uncertainty.direction)
     shares = [(key, f"{number(100.0 * share, 0)} %") for key, share in variances.items()]
     shares = [(key, share) for key, share in shares if share != "0 %"]
@@ -169,11 +150,10 @@ def _uncertainty(explanation: PointExplanation, limit_um: float) -> Markup:
         f"|E| ≤ {limit_um:g} µm with a probability of {probability} %."
         f" U95{length_words(uncertainty)} µm; variance shares: {largest}"
     )
-    more_shares = EMPTY
-    if len(shares) > FIRST:
-        more_shares = tag("details", tag("summary", "All shares") + rows(shares[FIRST:]),
-                     class_="ws-details", data_key="worst.shares")  # fmt: skip
-    return tag("p", text, class_="ws-tiny") + more_shares
+    if len(shares) <= FIRST:
+        return tiny(text)
+    table = rows(shares[FIRST:])
+    return tiny(text) + details("All shares", table, kind="details", data_key="worst.shares")
 
 
 def _details(explanation: PointExplanation, lever: str) -> Markup:
@@ -190,16 +170,16 @@ def _details(explanation: PointExplanation, lever: str) -> Markup:
     copied = "\n".join(
         "\t".join((c.key, f"{c.along_um:.3f}", *(f"{v:.3f}" for v in c.error_um))) for c in ranked
     )
-    place = spell_in_r(point.nominal_mm + explanation.shift_mm)
+    place = formatting.spell_in_r(point.nominal_mm + explanation.shift_mm)
     tilt = number(float(np.linalg.norm(point.orientation_urad)))
-    loop = LOOP_WORDS[explanation.loop]
-    box = text_box("worst:set.at", _axes(explanation), placeholder=EXAMPLE)
+    loop = formatting.LOOP_WORDS[explanation.loop]
+    box = html.text_box("worst:set.at", _axes(explanation), placeholder=EXAMPLE)
     return tag("div", join((
-        field("Point", box, "worst:set.at",
+        html.field("Point", box, "worst:set.at",
               hint="Axis positions; or click a point of the map or of a trace"),
-        tag("p", f"{place} mm · {loop} · tilt {tilt} µrad", class_="ws-tiny"),
+        tiny(f"{place} mm · {loop} · tilt {tilt} µrad"),
         block_html(Table(columns, lines)), *(_lever(c) for c in ranked if c.key == lever),
-        tag("p", ELSEWHERE, class_="ws-tiny"),
+        tiny(ELSEWHERE),
         button("Copy", "worst:copied", kind="quiet", data_copy=f"key\talong\tx\ty\tz\n{copied}",
                hint="Copy the table for a spreadsheet"),
     )))  # fmt: skip
@@ -217,16 +197,12 @@ def _lever(contribution: PointContribution) -> Markup:
 
 
 class DistancePanel(AnalysisPanel):
-    """Distance and angle between points picked on the map."""
-
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (*super().body_dependencies(picture), id(picture))
 
     def before_result(self, state: AppState) -> Markup:
-        point, drawn = (
-            awaited_form(state),
-            self.context.picture and measure_distance(self.context.picture),
-        )
+        point, picture = point_explanation.awaited_form(state), self.context.picture
+        drawn = picture and point_explanation.measure_distance(picture)
         hint = "Click two points of the map; a third one gives an angle"
         buttons = [button("Pick points", f"{self.name}:pick", kind="main", hint=hint)]
         if point:
@@ -238,15 +214,17 @@ class DistancePanel(AnalysisPanel):
             buttons.append(button("Pin", "notes:pin", "\n".join(drawn[0].lines()),
                                   hint="Pin a note with these numbers"))  # fmt: skip
         status = tag("p", POINTS[point], role="status") if point else EMPTY
-        return actions(*buttons) + status + tag("p", without_words(state), class_="ws-tiny")
+        return actions(*buttons) + status + tiny(without_words(state))
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action not in ("pick", "stop", "clear"):
             return super().handle(state, action, value)
-        picked = {name: state.forms[name] for name in POINTS if state.forms.get(name)}
-        points = {"pick": dict.fromkeys(POINTS, ""), "stop": picked, "clear": {}}[action]
-        other_forms = {name: text for name, text in state.forms.items() if name not in POINTS}
-        return replace(state, forms={**other_forms, **points})
+        forms = {name: text for name, text in state.forms.items() if name not in POINTS}
+        if action == "pick":
+            forms |= dict.fromkeys(POINTS, "")
+        elif action == "stop":
+            forms |= {name: state.forms[name] for name in POINTS if state.forms.get(name)}
+        return replace(state, forms=forms)
 
 
 class VolumePanel(Section):
@@ -258,7 +236,7 @@ class VolumePanel(Section):
     def body(self, picture: LivePicture) -> Markup:
         statistics, state = picture.statistics, picture.drawn_state
         u95 = {} if picture.uncertainty is None else picture.uncertainty.statistics()
-        intervals = {NAMES[key]: u95_behind(value) for key, value in u95.items()}
+        intervals = {NAMES[key]: formatting.u95_behind(value) for key, value in u95.items()}
         lines = [(name, f"{number(value, 2)}{intervals.get(name, '')} µm")
                  for name, value in zip(NAMES.values(), statistics.four, strict=True)]  # fmt: skip
         if not picture.is_difference:
@@ -271,8 +249,7 @@ class VolumePanel(Section):
         lines += [
             ("nodes", spell_count(picture.field.norm_um.size)),
             ("volume", f"{size} mm"),
-            ("loop", ", ".join((LOOP_WORDS[state.loop], *placed_words(state.view())))),
+            ("loop", ", ".join((formatting.LOOP_WORDS[state.loop], *placed_words(state.view())))),
         ]
-        at = spell_axes(statistics.max_at_axes).removeprefix("axes ")
-        where = f"max at {at} · {spell_in_r(statistics.max_at_mm)} mm"
-        return rows(lines) + tag("p", where, class_="ws-tiny")
+        at = formatting.spell_axes(statistics.max_at_axes).removeprefix("axes ")
+        return rows(lines) + tiny(f"max at {at} · {formatting.spell_in_r(statistics.max_at_mm)} mm")

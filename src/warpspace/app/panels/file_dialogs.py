@@ -16,7 +16,7 @@ from warpspace.app.documents.offline_page import build_offline_html, build_story
 from warpspace.app.evaluation.compare import drawn_tables, without_table
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.panel import Context, Dialog, Job, Jobs, actions, setting
+from warpspace.app.panels.panel import Context, Dialog, Job, Jobs, actions, quiet, setting
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
@@ -83,10 +83,8 @@ class FilesDialog(JobDialog):
         figures = {"": "map as displayed"}
         figures |= {name: name.replace("-", " ") for name, _ in services.figures}
         kinds = choice("state:set.page.figure", picture.state.page.figure, figures)
-        exports = (
-            button(f"{end[1:].upper()}", "files:export", end, hint=hint)
-            for end, hint in services.exports
-        )
+        exports = (button(end[1:].upper(), "files:export", end, hint=hint)
+                   for end, hint in services.exports)  # fmt: skip
         link = (
             tag("h3", "Link"),
             tag("p", "This server requires a token. A link without the token works only for people"
@@ -99,7 +97,7 @@ class FilesDialog(JobDialog):
             tag("p", "Current errors, tolerances and machine, with display settings and camera."),
             actions(button("Save scene (TOML)", "files:save", kind="main", hint="Ctrl+S")),
             *(link if services.token else ()),
-            tag("h3", "Picture"), tag("p", transfers.exported_words(picture), class_="ws-quiet"),
+            tag("h3", "Picture"), quiet(transfers.exported_words(picture)),
             actions(button("Save current view (PNG)", "files:view")),
             field("Figure", kinds, "state:set.page.figure"),
             actions(button("Save figure (PNG)", "files:figure")),
@@ -112,8 +110,7 @@ class FilesDialog(JobDialog):
         ))  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
-        services = self.context.services
-        if action == "share" and services.token and not value:
+        if action == "share" and self.context.services.token and not value:
             return replace(state, page=replace(state.page, window=self.name))
         commands: dict[str, Callable[[], None]] = {
             "file": partial(self._open, value),
@@ -138,10 +135,9 @@ class FilesDialog(JobDialog):
             if name.endswith(endings):
                 self.context.send(f"{panel}:file", value)
                 return
-        self._uploads.queue("Opening", partial(self._parse, value))
+        self._uploads.start("Opening", partial(self._parse, value), waits=True)
 
     def _parse(self, value: str, job: Job) -> None:
-        """Parse a file in a job."""
         name, content = transfers.read_upload(value)
         notes, is_robot = list[str](), b"<robot" in content[:4096]
         if is_robot:
@@ -154,9 +150,8 @@ class FilesDialog(JobDialog):
         opened, camera = scene_file.open_text(text, transfers.safe_name(name), name)
         replaces_all = is_robot or scene_file.settings_of(text) != ""
         if not job.is_set():
-            self.context.call_soon(
-                partial(self.context.show_opened, opened, camera, keeps_comparison=not replaces_all)
-            )
+            show = partial(self.context.show_opened, keeps_comparison=not replaces_all)
+            self.context.call_soon(partial(show, opened, camera))
             self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
 
     def _follow(self, link: str) -> None:
@@ -221,9 +216,8 @@ class FilesDialog(JobDialog):
             view_camera = client.camera
             size = view_camera.image_height, view_camera.image_width
             size_px = np.clip(size, *VIEW_PX).tolist()
-            pixels: Any = client.get_render(
-                *size_px, transport_format="png", timeout=RENDER_TIMEOUT_S
-            )
+            settings: Any = {"transport_format": "png", "timeout": RENDER_TIMEOUT_S}
+            pixels: Any = client.get_render(*size_px, **settings)
             return self.context.services.draw_view(picture, pixels, camera.remember(), job)
 
         self.make("Current view", "_view.png", draw, as_drawn=True)
@@ -281,7 +275,6 @@ class ReportDialog(JobDialog):
         ]
         # the list of notes may hold a box for the same name
         author = text_box("state:set.page.author", picture.state.page.author, id="ws-report-author")
-        hint = "To add more results, use “Add to report” below a result."
         return join((
             tag("p", f"{subject} Limit: {limit}."),
             field("Author", author, "report.author"),
@@ -292,7 +285,7 @@ class ReportDialog(JobDialog):
             self._jobs.html(),
             tag("h3", "Contents"),
             tag("ul", join((*(tag("li", chapter) for chapter in ALWAYS), *added))),
-            tag("p", hint, class_="ws-quiet"),
+            quiet("To add more results, use “Add to report” below a result."),
         ))  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:

@@ -20,7 +20,7 @@ from warpspace.app.evaluation.compare import pinned_side, with_before, without_t
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.analysis_panel import RECORD, AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import details_html, result_html
-from warpspace.app.panels.panel import Context, Refresh
+from warpspace.app.panels.panel import Context, Refresh, actions, quiet
 from warpspace.app.state.app_state import AppState
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.compensate import Compensation
@@ -37,7 +37,7 @@ NO_GAIN_UM = 0.005  # smaller improvements are not offered
 class AdjustIncluded(Adjust):
     """An adjustment of errors that are not excluded."""
 
-    keys: tuple[str, ...]
+    keys: tuple[str, ...] = ()
 
     def included(self, scene: Scene) -> Sequence[str]:
         return [key for key in scene.parameter_keys if key in self.keys]
@@ -48,6 +48,10 @@ class AdjustPanel(AnalysisPanel):
 
     runs_on_open = True
 
+    @property
+    def kind(self) -> type[Analysis]:
+        return AdjustIncluded
+
     def options(self) -> Sequence[Option]:
         changes = {"default": None, "choices": ("all",), "choice_labels": {"all": "any error"}}
         return [replace(o, **changes) if o.name == "adjustable" else o for o in super().options()]
@@ -55,10 +59,8 @@ class AdjustPanel(AnalysisPanel):
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), "objective": Objective.MAX}
 
-    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
-        analysis = super().build_analysis(state, values, scene)
-        keys = tuple(key for key in state.amplitudes if state.exclusions.active(key))
-        return AdjustIncluded(**vars(analysis), keys=keys)
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        return {"keys": tuple(filter(state.exclusions.active, state.amplitudes))}
 
     def result_key(self, state: AppState) -> ResultKey:
         return (*super().result_key(state), state.exclusions)  # even if an excluded one is zero
@@ -73,7 +75,7 @@ class AdjustPanel(AnalysisPanel):
             keys = ", ".join(result.adjustable)
             return tag("p", f"No improvement possible: {keys} have their optimum values.")
         objective = "largest |E|" if result.objective is Objective.MAX else "RMS of |E|"
-        return tag("p", f"Adjustments that minimise the {objective}.", class_="ws-quiet")
+        return quiet(f"Adjustments that minimise the {objective}.")
 
     def offered_changes(self, result: Any) -> Sequence[int]:
         """Return the sets that improve on smaller ones, which come first."""
@@ -119,7 +121,7 @@ class BestPanel(AdjustPanel):
         is_current = outcome is not None and outcome.key == key
         status = "No single adjustment improves it." if is_current else "Searching …"
         body = self.problem_html(state) or self.cards_html(key)
-        body = body or tag("p", status, class_="ws-quiet")
+        body = body or quiet(status)
         body += RECORD if key == self._applied_key else EMPTY
         return {self.name: tag("h4", "Best single adjustment") + body}
 
@@ -144,7 +146,6 @@ class CompensatePanel(AnalysisPanel):
     _picture: tuple[Result, str] | None = None
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
-        """List the options of the chosen format and the machine."""
         if not self.is_ready(state):
             return ()
         kind = find_format(self.values(state)["formats"])
@@ -176,8 +177,7 @@ class CompensatePanel(AnalysisPanel):
         control = choice(f"{self.name}:set.formats", chosen, names, label="Controller")
         if chosen:
             return control
-        text = "A compensation table for the controller, and the residual error."
-        return control + tag("p", text, class_="ws-quiet")
+        return control + quiet("A compensation table for the controller, and the residual error.")
 
     def headline(self, result: Result) -> Markup:
         return EMPTY
@@ -195,7 +195,6 @@ class CompensatePanel(AnalysisPanel):
         return join(drawn) + details_html(assumptions, "Points, loop, assumptions")
 
     def actions(self, result: Any, *, stale: bool) -> Markup:
-        """Render the buttons: save the table, maps, and the state of the map."""
         state, hint = self.context.state, "Several files are saved as one ZIP file"
         is_applicable = is_applicable_to(state, result.controller)
         disabled = {RESIDUAL} if _is_rounding(result) else set[str]()
@@ -207,17 +206,14 @@ class CompensatePanel(AnalysisPanel):
         )  # fmt: skip
         row = [button("Save table", f"{self.name}:table", kind="main", hint=hint)]
         if self.context.services.draw_compensation is not None:
-            row += [
-                button(
-                    "Maps", f"{self.name}:maps", "show", hint="Before, after and residual error"
-                ),
-                button("Save maps", f"{self.name}:maps", "save", hint="One sheet for a report"),
-            ]
+            event, about = f"{self.name}:maps", "Before, after and residual error"
+            row.append(button("Maps", event, "show", hint=about))
+            row.append(button("Save maps", event, "save", hint="One sheet for a report"))
         row.append(button("Add to report", f"{self.name}:report", kind="quiet"))
         row += [RECORD] if box_of(state) != MACHINE else []
         box_choice = tag("div", tag("span", "Map", class_="ws-quiet") + boxes,
                          class_="ws-actions", role="group", aria_label="Map")  # fmt: skip
-        return tag("div", join(row), class_="ws-actions") + box_choice
+        return actions(*row) + box_choice
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         result = self.outcome.result if self.outcome is not None else None

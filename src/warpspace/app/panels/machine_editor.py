@@ -12,27 +12,13 @@ from markupsafe import Markup
 from PIL import Image
 
 from warpspace.analysis.axis_motion import AxisMotion, assemble_motion
-from warpspace.app.browser.html import (
-    EMPTY,
-    button,
-    choice,
-    field,
-    fill,
-    ident,
-    join,
-    tag,
-    text_box,
-)
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, fill, join, tag, text_box
 from warpspace.app.evaluation import machine_edits
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine_bodies import (
-    NO_POSITIONS,
-    chosen_trace,
-    played_axis,
-    standing,
-)
+from warpspace.app.evaluation.machine_bodies import chosen_trace, played_axis, standing
+from warpspace.app.panels import panel
 from warpspace.app.panels.block_html import block_html
-from warpspace.app.panels.panel import Context, Dialog, Section, setting
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_spans
 from warpspace.app.state.tree import leaves
@@ -47,7 +33,7 @@ from warpspace.units import MICROMETRE, MINUS
 OPEN_MESH = "A mesh of this machine is not watertight; it is drawn unchanged."
 
 
-class PositionsSection(Section):
+class PositionsSection(panel.Section):
     name, task, title = "positions", "machine", "Axis positions"
     sentence = "Rotary axes move the working volume, linear axes the tool point"
 
@@ -60,9 +46,9 @@ class PositionsSection(Section):
         is_open = state.machine.shown and check_meshes(state.scene.machine)
         linear = (f"machine.linear_mm.{axis}" for axis in linear_spans(state.scene))
         paths = (*(f"positions.{axis}" for axis in state.positions), *linear)
-        bars = [setting(state, path, bar=True) for path in paths]
+        bars = [panel.setting(state, path, bar=True) for path in paths]
         lines = (position, OPEN_MESH) if is_open else (position,)
-        return join((*bars, *(tag("p", line, class_="ws-tiny") for line in lines)))
+        return join((*bars, *(panel.tiny(line) for line in lines)))
 
 
 # --- Rotary axes: animation, polar plots of one trace, table of all traces ------------------------
@@ -96,18 +82,18 @@ AVERAGE = (
 MOST_ROWS = 24  # traces in the table
 
 
-class RotarySection(Section):
+class RotarySection(panel.Section):
     name, task, title = "rotary", "machine", "Rotary axes"
     sentence = "Error motion of traced points during rotation of an axis (ISO 230-7)"
 
     def body(self, picture: LivePicture) -> Markup:
         state, stage = picture.state, self.context.stage
-        axis, playing, position = played_axis(state), False, NO_POSITIONS
+        axis, playing = played_axis(state), stage is not None and stage.playing
+        position = {} if stage is None else stage.position
         if axis is None:
-            return tag("p", "This machine has no rotary axis.", class_="ws-quiet")
+            return panel.quiet("This machine has no rotary axis.")
         if stage is not None:
             stage.moved = self._follow
-            playing, position = stage.playing, stage.position
         buttons = [button("Pause" if playing else f"Turn {axis}", "rotary:play",
                           hint="Animate the traced points")]  # fmt: skip
         if playing or position:
@@ -117,7 +103,7 @@ class RotarySection(Section):
             hint, path = "Move the axis to the paused position", f"state:set.positions.{axis}"
             buttons.append(button("Move axes here", path, round(position[axis]), hint=hint))
         return join((
-            tag("div", join(buttons), class_="ws-actions"),
+            panel.actions(*buttons),
             fill('<p data-piece="rotary.angle" class="ws-tiny"></p>'),
             _trace(picture), _points(state, axis),
         ))  # fmt: skip
@@ -139,20 +125,18 @@ class RotarySection(Section):
 
 def _trace(picture: LivePicture) -> Markup:
     if not picture.state.shown.traces:
-        turn_on = button("Show traces", "state:set.shown.traces", "1", kind="main")
-        return tag("div", turn_on, class_="ws-actions")
+        return panel.actions(button("Show traces", "state:set.shown.traces", "1", kind="main"))
     moved = picture.moved_traces
     if not moved:
-        return tag("p", NOTHING_MOVED, class_="ws-quiet")
+        return panel.quiet(NOTHING_MOVED)
     name, path = chosen_trace(picture), "state:set.rotary.chosen"
-    chosen = field("Trace", choice(path, name, {trace: trace for trace in moved}), path)
+    chosen = html.field("Trace", html.choice(path, name, {trace: trace for trace in moved}), path)
     motions = {trace: motion_of(picture, moved[trace]) for trace in [*moved][:MOST_ROWS]}
     motion = motions[name] if name in motions else motion_of(picture, moved[name])
-    motion_plots = _motion(motion, name) if motion else tag("p", ON_THE_AXIS, class_="ws-quiet")
+    motion_plots = _motion(motion, name) if motion else panel.quiet(ON_THE_AXIS)
     head = join(fill("<th>{} <small>{}</small></th>", *heading) for heading in HEADS.items())
     table = tag("table", tag("tr", head) + join(starmap(_numbers, motions.items())))
-    parts = tag("summary", "Table of all traces") + tag("p", AVERAGE, class_="ws-tiny") + table
-    return chosen + motion_plots + tag("details", parts, class_="ws-options")
+    return chosen + motion_plots + panel.details("Table of all traces", panel.tiny(AVERAGE), table)
 
 
 def _numbers(name: str, motion: AxisMotion | None) -> Markup:
@@ -190,10 +174,10 @@ def _motion(motion: AxisMotion, name: str) -> Markup:
     for part in motion.motions:
         chart = motion_lines(part.name, motion, part)
         plots.append(block_html(replace(chart, title=part.name, note="")))
-        notes.append(tag("p", f"{part.iso}: {chart.note}.", class_="ws-tiny"))
+        notes.append(panel.tiny(f"{part.iso}: {chart.note}."))
     label = f"Error motion of {name}"
     drawn = tag("div", join(plots), class_="ws-plots", role="group", aria_label=label)
-    return join((drawn, fill(KEY), *notes, tag("p", ABOUT, class_="ws-tiny")))
+    return join((drawn, fill(KEY), *notes, panel.tiny(ABOUT)))
 
 
 def _points(state: AppState, played: str) -> Markup:
@@ -202,17 +186,16 @@ def _points(state: AppState, played: str) -> Markup:
         on = index not in state.rotary.off
         change = f"{'+' if on else '-'}{index}"
         traced.append(button(f"Trace {name}", "state:set.rotary.off", change, pressed=on))
-    parts = [tag("div", join(traced), class_="ws-actions"), setting(state, "rotary.own_mm")]
+    parts = [panel.actions(*traced), panel.setting(state, "rotary.own_mm")]
     if len(state.positions) > 1:
-        parts += [setting(state, f"rotary.held.{axis}") for axis in state.position_spans]
+        parts += [panel.setting(state, f"rotary.held.{axis}") for axis in state.position_spans]
         low, high = state.scene.machine.axes[played].travel
         high = min(high, low + 359.0)  # at most one revolution
         turns = range(math.ceil(low / 90.0), math.floor(high / 90.0) + 1)
         positions, hint = ",".join(str(90 * turn) for turn in turns), "While the other axis rotates"
         path = f"state:set.rotary.held.{played}"
         parts.append(button(f"Hold {played} at every 90°", path, positions, hint=hint))
-    summary = tag("summary", "Traced points and positions")
-    return tag("details", summary + join(parts), class_="ws-options")
+    return panel.details("Traced points and positions", *parts)
 
 
 # --- The editor: chain, frames, travels and working volume ----------------------------------------
@@ -249,13 +232,11 @@ MACHINE_BUTTONS = (
 )  # fmt: skip
 
 
-class EditorSection(Section):
+class EditorSection(panel.Section):
     name, task, title = "editor", "machine", "Edit the machine"
     sentence = "Axes, their order, offsets and travels; or another machine to start from"
 
-    def __init__(self, context: Context) -> None:
-        super().__init__(context)
-        self._refused = ("", "")  # rejected chain and error message
+    _refused = ("", "")  # rejected chain and error message
 
     def body(self, picture: LivePicture) -> Markup:
         state, name = picture.state, "editor:set.chain"
@@ -264,13 +245,13 @@ class EditorSection(Section):
         box = text_box(name, typed, aria_invalid=str(bool(problem)).lower())
         machine_buttons = (button(*arguments, hint=hint) for *arguments, hint in MACHINE_BUTTONS)
         return join((
-            field("Chain", box, name, hint=CHAIN_HINT),
-            tag("p", problem, class_="ws-problem", role="alert") if problem else EMPTY,
+            html.field("Chain", box, name, hint=CHAIN_HINT),
+            panel.alert(problem) if problem else EMPTY,
             *(_frame(state, tables, frame)
               for frame in ("w", *reversed(chain.workpiece), *chain.tool, "S", "t")),
             _bodies(tables["mesh"]),
-            *(tag("p", note, class_="ws-tiny") for note in state.scene.notes),
-            tag("div", join(machine_buttons), class_="ws-actions"),
+            *(panel.tiny(note) for note in state.scene.notes),
+            panel.actions(*machine_buttons),
         ))  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -311,29 +292,27 @@ def _frame(state: AppState, tables: machine_edits.Tables, name: str) -> Markup:
             "turn": "Reverse direction",
             "remove": f"Remove {name}",
         }
-        buttons = [
-            button(text, "editor:do", f"{command} {name}") for command, text in labels.items()
-        ]
+        buttons = [button(text, "editor:do", f"{command} {name}")
+                   for command, text in labels.items()]  # fmt: skip
         if axis.is_linear:
             hint, pressed = "Gantry: two guides with independent errors", gantry is not None
             guides = button("Two guides", "editor:do", f"gantry {name}", hint=hint, pressed=pressed)
             buttons.insert(-1, guides)
-        lines += [*_guides(state, gantry), tag("div", join(buttons), class_="ws-actions")]
-    summary = fill("<summary><b>{}</b> {}</summary>", name, about)
-    return tag("details", summary + join(lines), class_="ws-frame", data_key=f"frame-{name}")
+        lines += [*_guides(state, gantry), panel.actions(*buttons)]
+    heading = fill("<b>{}</b> {}", name, about)
+    return panel.details(heading, *lines, kind="frame", data_key=f"frame-{name}")
 
 
 def _boxes(
     command: str, label: str, unit: str, values: Sequence[float], letters: Sequence[str]
 ) -> Markup:
-    """Render a line of number boxes with their letters, for a command of the editor."""
     frame = command.partition(" ")[2]
     boxes: list[Markup] = []
     for index, (value, letter) in enumerate(zip(values, letters, strict=True)):
         name = f"editor:set.{command} {index}"
         description = f"{label} of {frame}, {letter} in {unit}"
         box = text_box(name, spell_typed(value), label=description, inputmode="decimal")
-        boxes.append(fill('<label for="{}">{}</label>{}', ident(name), letter, box))
+        boxes.append(fill('<label for="{}">{}</label>{}', html.ident(name), letter, box))
     head = fill("<span>{} <small>{}</small></span>", label, unit)
     return tag("div", head + join(boxes), class_="ws-numbers-line")
 
@@ -352,10 +331,9 @@ def _guides(state: AppState, gantry: Gantry | None) -> list[Markup]:
     else:
         values = [round(value, 9) for value in errors]
         lines.append(_boxes(f"guide {name}", "Error of each guide", MICROMETRE, values, "12"))
-    hint = "Click to change the direction"
     across = button(f"Spaced along {gantry.across}", "editor:do", f"across {name}", kind="link",
-                    hint=hint)  # fmt: skip
-    return [*lines, across, tag("p", note, class_="ws-tiny")]
+                    hint="Click to change the direction")  # fmt: skip
+    return [*lines, across, panel.tiny(note)]
 
 
 def _bodies(bodies: dict[str, BodySource]) -> Markup:
@@ -364,10 +342,10 @@ def _bodies(bodies: dict[str, BodySource]) -> Markup:
         remove = button("Remove", "editor:do", f"mesh {frame}", kind="link",
                         aria_label=f"Remove the body of {frame}")  # fmt: skip
         lines.append(tag("p", join((tag("b", frame), " ", _source(source), " ", remove))))
-    lines = lines or [tag("p", "All bodies are generated automatically.")]
-    summary = tag("summary", "Bodies defined by the scene")
-    return tag("details", join((summary, *lines, tag("p", BODIES, class_="ws-tiny"))),
-               class_="ws-frame", data_key="frame-bodies")  # fmt: skip
+    lines = [*(lines or [tag("p", "All bodies are generated automatically.")]), panel.tiny(BODIES)]
+    return panel.details(
+        "Bodies defined by the scene", *lines, kind="frame", data_key="frame-bodies"
+    )
 
 
 def _source(source: BodySource) -> str:
@@ -386,7 +364,7 @@ def _source(source: BodySource) -> str:
 WIDTH_PX = 240  # of a thumbnail; displayed smaller, for high-resolution screens
 
 
-class MachinesDialog(Dialog):
+class MachinesDialog(panel.Dialog):
     name, title = "machines", "Start from a machine"
 
     def body(self, picture: LivePicture) -> Markup:

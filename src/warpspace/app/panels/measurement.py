@@ -10,20 +10,9 @@ from markupsafe import Markup
 
 from warpspace.analysis.blocks import Lines, Table
 from warpspace.analysis.description import Analysis, ProgressCallback, Result
-from warpspace.analysis.options import Option
 from warpspace.analysis.registry import Entry
-from warpspace.app.browser.html import (
-    EMPTY,
-    button,
-    choice,
-    join,
-    number,
-    rows,
-    switch,
-    tag,
-    text_box,
-    upload_button,
-)
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, choice, join, number, tag
 from warpspace.app.browser.html import field as labelled
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
@@ -34,10 +23,10 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import chosen_test, plan_test
 from warpspace.app.panels.analysis_panel import AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
-from warpspace.app.panels.panel import Context, Job, Jobs
+from warpspace.app.panels.panel import Context, Job, Jobs, actions, alert, details, quiet, tiny
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.form_values import TEST, read_form, with_form
+from warpspace.app.state.form_values import TEST, with_form
 from warpspace.bench.base import BenchResult, BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table as parse_test
 from warpspace.calibration.calibrate import Calibrate
@@ -54,8 +43,6 @@ WHAT = "CSV file of readings"
 
 @dataclass(frozen=True, slots=True)
 class UploadedFile:
-    """A file uploaded by the page."""
-
     name: str  # never a path
     content: Any = field(repr=False)  # its text, or an object read from it
     description: str = ""  # kind and number of readings
@@ -64,8 +51,6 @@ class UploadedFile:
 
 
 class FilesPanel(AnalysisPanel):
-    """An analysis of uploaded files."""
-
     most_bytes, what = MOST_BYTES, WHAT
 
     def __init__(self, context: Context, entry: Entry) -> None:
@@ -88,20 +73,18 @@ class FilesPanel(AnalysisPanel):
         self.files = files
 
     def files_html(self) -> Markup:
-        """Render the list of files, and the error of the last upload."""
         lines: list[tuple[Markup, Markup]] = []
         for index, file in enumerate(self.files):
             remove = button("✕", f"{self.name}:remove", index, kind="link",
                             aria_label=f"Remove {file.name}")  # fmt: skip
             lines.append((tag("span", file.name) + tag("small", f" {file.description}"), remove))
-        problem = tag("p", self._upload_problem, class_="ws-problem", role="alert")
-        table = rows(lines) if lines else EMPTY
+        problem = alert(self._upload_problem)
+        table = html.rows(lines) if lines else EMPTY
         return join((problem if self._upload_problem else EMPTY, table, self._uploads.html()))
 
     def upload_html(self, label: str) -> Markup:
         hint = f"A CSV file with a header, at most {MOST_BYTES >> 20} MB"
-        upload = upload_button(label, self.name, MOST_BYTES, ".csv", hint=hint)
-        return tag("div", upload, class_="ws-actions")
+        return actions(html.upload_button(label, self.name, MOST_BYTES, ".csv", hint=hint))
 
     def receive(self, read: Callable[[], tuple[str, bytes]]) -> None:
         """Parse files in jobs, one after the other; errors are shown above the files."""
@@ -111,7 +94,7 @@ class FilesPanel(AnalysisPanel):
             if not job.is_set():
                 self.context.call_soon(partial(self._accept, accept))
 
-        self._uploads.queue("Reading", work)
+        self._uploads.start("Reading", work, waits=True)
 
     def _accept(self, accept: Callable[[], None]) -> None:
         self._upload_problem = ""
@@ -180,24 +163,22 @@ class TestsPanel(FilesPanel):
             return chooser
         test = self._body(state)
         if picture.is_difference:
-            test = tag("p", "Not available for the difference of two machines: show A or B.",
-                       class_="ws-problem", role="alert")  # fmt: skip
+            test = alert("Not available for the difference of two machines: show A or B.")
         columns = ",".join(column.name for column in kind.columns)
         about = tag("p", kind.description) + tag("p", f"Columns of a file: {columns}")
         return join((
             chooser, test, self.files_html(),
             EMPTY if self.files else self.upload_html("Measured readings …"),
-            switch("test:path", "Show test path", on=state.forms.get("test.path") != "0",
+            html.switch("test:path", "Show test path", on=state.forms.get("test.path") != "0",
                    hint="Nominal grey, actual coloured, with the exaggeration of the map"),
-            tag("details", tag("summary", "Procedure") + tag("div", about), class_="ws-details",
-                data_key="test.procedure"),
+            details("Procedure", tag("div", about), kind="details", data_key="test.procedure"),
         ))  # fmt: skip
 
     def headline(self, result: Result) -> Markup:
         assert isinstance(result, BenchResult)  # noqa: S101 - of a test
         rms = result.rms_difference
         difference = EMPTY if rms is None else tag("p", f"RMS of measured − model: {number(rms)}")
-        return difference + tag("p", result.model.plan.place, class_="ws-tiny")
+        return difference + tiny(result.model.plan.place)
 
     def result_html(self, result: Result) -> Markup:
         return join(map(block_html, (*result.blocks_of(Lines), *result.blocks_of(Table))))
@@ -231,8 +212,6 @@ ESTIMABILITY = (
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrateTexts(Calibrate):
-    """A calibration from uploaded texts."""
-
     files: tuple[UploadedFile, ...] = ()
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> Calibration:
@@ -267,20 +246,19 @@ def read_uploaded(
 class CalibratePanel(FilesPanel):
     """Uploaded readings, fitted errors, and residuals as arrows in the drawing."""
 
-    def __init__(self, context: Context, entry: Entry) -> None:
-        super().__init__(context, entry)
-        self._next_kind, self._arrows = "", ""
-        self._drawn: Nodes | None = None
+    unsupported = ("kinds",)  # set per file
+    _next_kind, _arrows = "", ""
+    _drawn: Nodes | None = None
 
-    def options(self) -> Sequence[Option]:
-        return [option for option in super().options() if option.name != "kinds"]  # set per file
+    @property
+    def kind(self) -> type[Analysis]:
+        return CalibrateTexts
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), "next_count": "3"}
 
-    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
-        analysis = read_form(CalibrateTexts, self.options(), values, scene)
-        return replace(analysis, files=self.files)
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        return {"files": self.files}
 
     def before_result(self, state: AppState) -> Markup:
         introduction = "Errors of this machine are fitted to readings in CSV files."
@@ -289,12 +267,12 @@ class CalibratePanel(FilesPanel):
         kinds |= {name: _kind_words(name) for name in (*KINDS, *bench_names())}
         name, _, options = self._next_kind.partition(":")
         return join((
-            self.files_html(), EMPTY if self.files else tag("p", introduction, class_="ws-quiet"),
+            self.files_html(), EMPTY if self.files else quiet(introduction),
             self.upload_html("Add readings …"),
             choice("calibrate:bundled", "", bundled, label="Bundled readings"),
             labelled("Kind", choice("calibrate:kind", name, kinds), "calibrate:kind",
                      hint="Kind of the readings to be added"),
-            text_box("calibrate:test-options", options, label="Test options",
+            html.text_box("calibrate:test-options", options, label="Test options",
                      placeholder="plane=XZ:radius=150") if name in bench_names() else EMPTY,
         ))  # fmt: skip
 
@@ -309,7 +287,7 @@ class CalibratePanel(FilesPanel):
             if keys:
                 omitted = f" and {len(keys) - MOST_NAMED} more" if len(keys) > MOST_NAMED else ""
                 names = ", ".join(keys[:MOST_NAMED])
-                parts.append(tag("p", f"{title}: {names}{omitted}", class_="ws-quiet"))
+                parts.append(quiet(f"{title}: {names}{omitted}"))
         notes = (note.replace("--", "") for note in result.notes[:MOST_NAMED])
         return join((*parts, *(tag("p", note, class_="ws-caveat") for note in notes)))
 
@@ -320,7 +298,7 @@ class CalibratePanel(FilesPanel):
         arrows = labelled("Residual arrows", choice("calibrate:arrows", self._arrows, ARROWS),
                           "calibrate:arrows",
                           hint="Observed − predicted at each reading, exaggerated")  # fmt: skip
-        status = tag("p", self._draw_arrows(), class_="ws-tiny")
+        status = tiny(self._draw_arrows())
         folded = details_html(block for block in blocks if block not in visible)
         return join((arrows, status, *map(block_html, visible), folded))
 
@@ -370,14 +348,11 @@ class CalibratePanel(FilesPanel):
 
 def arrows_of(calibration: Calibration, *, before: bool) -> tuple[Array, Array]:
     """Return position and residual of each vector reading, [n, 3] mm and [n, 3] mm."""
-    feet: list[Array] = [np.zeros((0, 3))]
-    vectors: list[Array] = [np.zeros((0, 3))]
-    for group in calibration.fitted:
-        lines = group.before_mm if before else group.after_mm
-        if lines.shape[1] == 3:
-            feet.append(group.readings.nominal_mm)
-            vectors.append(lines)
-    return np.concatenate(feet), np.concatenate(vectors)
+    none = np.zeros((0, 3))
+    groups = [group for group in calibration.fitted if group.before_mm.shape[1] == 3]
+    residuals_mm = [group.before_mm if before else group.after_mm for group in groups]
+    feet = [group.readings.nominal_mm for group in groups]
+    return np.concatenate([none, *feet]), np.concatenate([none, *residuals_mm])
 
 
 def _kind_words(kind: str) -> str:

@@ -6,13 +6,7 @@ from dataclasses import replace
 
 from markupsafe import Markup
 
-from warpspace.analysis.note_tables import (
-    note_numbers,
-    spell_change,
-    spell_numbers,
-    spell_place,
-    stale_remark,
-)
+from warpspace.analysis import note_tables
 from warpspace.app.browser.html import EMPTY, button, fill, join, linked, tag, text_box
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents.offline_page import step_words
@@ -20,7 +14,7 @@ from warpspace.app.documents.scene_file import reopened, view_of
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import explain_point, pick_worst, with_picked
-from warpspace.app.panels.panel import Context, Panel, Refresh, actions, setting
+from warpspace.app.panels.panel import Panel, Refresh, actions, quiet, setting, tiny
 from warpspace.app.state.app_state import AppState, Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.tree import leaves, set_leaf, stored
@@ -47,12 +41,9 @@ class NotesPanel(Panel):
     """The list of notes, in place of the tasks."""
 
     name = "notes"
-
-    def __init__(self, context: Context) -> None:
-        super().__init__(context)
-        self._before_decision: AppState | None = None  # of the decision that is being written
-        # the restored view of a note: title, id of the note, state and camera before it
-        self._restored: tuple[str, str, AppState, CameraMemory] | None = None
+    _before_decision: AppState | None = None  # of the decision that is being written
+    # the restored view of a note: title, id of the note, state and camera before it
+    _restored: tuple[str, str, AppState, CameraMemory] | None = None
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         state, bar = picture.state, EMPTY
@@ -115,9 +106,13 @@ class NotesPanel(Panel):
             note = Note(kind=kind, text=text, author=_author(state), at=at, on=on, view=view,
                         loop=state.loop.value)  # fmt: skip
             if self._before_decision is not None and kind == "decision":
-                before = note_numbers(self._before_decision.resulting_scene(), [note])[0]
+                before = note_tables.note_numbers(self._before_decision.resulting_scene(), [note])[
+                    0
+                ]
                 note = replace(note, before=before, change=_changes(self._before_decision, state))
-            note = replace(note, numbers=note_numbers(state.resulting_scene(), [note])[0])
+            note = replace(
+                note, numbers=note_tables.note_numbers(state.resulting_scene(), [note])[0]
+            )
         return _opened(replace(state, review=with_note(state.review, note)), LIST)
 
     def _place(self, state: AppState) -> tuple[Mapping[str, float], NoteAnchor | None]:
@@ -211,9 +206,8 @@ def _revert_decision(state: AppState, note: Note) -> AppState:
         elif math.isclose(now, new, abs_tol=SAME):
             state = set_leaf(state, paths[path], repr(old))
         else:
-            unchanged.append(
-                f"{name} not reverted: now {spell_short(now)} instead of {spell_short(new)}"
-            )
+            values = f"now {spell_short(now)} instead of {spell_short(new)}"
+            unchanged.append(f"{name} not reverted: {values}")
     if len(unchanged) < len(note.change):
         note = note.edited(status="open")
         if len(note.replies) < MAX_REPLIES:
@@ -233,6 +227,8 @@ def _changes(before: AppState, after: AppState) -> dict[str, Pair]:
 
 # --- The list -------------------------------------------------------------------------------------
 
+NOTE_FACTS = note_tables.spell_place, note_tables.spell_numbers, note_tables.spell_change
+
 
 def _list_html(state: AppState) -> Markup:
     close = button("✕", "notes:close", kind="quiet", hint="Close (Esc)",
@@ -246,7 +242,7 @@ def _list_html(state: AppState) -> Markup:
         _form(state, "") if edited == NEW else EMPTY,
         *(_form(state, edited) if note.id == edited else _note_html(number, note, steps)
           for number, note in enumerate(state.review, 1)),
-        EMPTY if state.review else tag("p", "No notes yet.", class_="ws-quiet"),
+        EMPTY if state.review else quiet("No notes yet."),
     ))  # fmt: skip
 
 
@@ -266,10 +262,7 @@ def _message_html(message: Note | Reply) -> Markup:
 
 
 def _note_html(number: int, note: Note, steps: Sequence[Note]) -> Markup:
-    facts, texts = (
-        [spell_place(note), spell_numbers(note), spell_change(note)],
-        [_message_html(note)],
-    )
+    facts, texts = [spell(note) for spell in NOTE_FACTS], [_message_html(note)]
     if note.versions:
         texts = [tag("p", "Conflicting edits: select one version.", class_="ws-stale")]
         for index, version in enumerate((note, *note.versions)):
@@ -279,7 +272,7 @@ def _note_html(number: int, note: Note, steps: Sequence[Note]) -> Markup:
     place = f" · step {steps.index(note) + 1}" if note.step else ""
     return tag("article", join((
         tag("h3", f"{number} · {note.kind}{place}"), *texts,
-        tag("p", " · ".join(filter(None, facts)), class_="ws-tiny"),
+        tiny(" · ".join(filter(None, facts))),
         tag("p", "", class_="ws-changed", data_piece=f"note.{note.id}"),
         *(tag("blockquote", _message_html(answer)) for answer in note.replies),
         text_box(reply, "", label=f"Reply to note {number}", placeholder="Reply",
@@ -292,19 +285,13 @@ def _note_html(number: int, note: Note, steps: Sequence[Note]) -> Markup:
 def _buttons(note: Note, steps: Sequence[Note]) -> Markup:
     """Render the buttons of a note; a note with conflicting versions cannot be edited."""
     is_done, free = note.status == "done", not note.versions
-    place = steps.index(note) if note.step else 0
+    place, change = steps.index(note) if note.step else 0, free and note.change
     rows = (
         ("Done", "status", "", "Mark as open" if is_done else "Mark as done", free),
         ("Show", "show", "", "Restore view, errors and camera of the note", True),
         ("Edit", "edit", "", "", free),
         ("Delete", "delete", "", "", True),
-        (
-            "Revert",
-            "take-back",
-            "",
-            "Restore the values before this decision",
-            free and note.change,
-        ),
+        ("Revert", "take-back", "", "Restore the values before this decision", change),
         ("Add to story", "step", "add", "", free and not note.step),
         ("↑", "step", "up", "Earlier in the story", free and place > 0),
         ("↓", "step", "down", "Later in the story", free and note.step and note != steps[-1]),
@@ -335,7 +322,7 @@ class NoteNumbersPanel(Panel):
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         review, scene = picture.state.review, picture.state.resulting_scene()
-        remarks = [*map(stale_remark, review, note_numbers(scene, review))]
+        remarks = [*map(note_tables.stale_remark, review, note_tables.note_numbers(scene, review))]
         stale = [str(number) for number, remark in enumerate(remarks, 1) if remark]
         self.context.page.call("overlay.show", {"stale": stale})
         return {
@@ -355,11 +342,8 @@ class StoryPanel(Panel):
 
     name = "story"
     refresh = Refresh.IMMEDIATE
-
-    def __init__(self, context: Context) -> None:
-        super().__init__(context)
-        self._number, self._step_html = 0, EMPTY  # of the present step; empty while none is played
-        self._camera = context.camera.remember()  # before the story
+    _number, _step_html = 0, EMPTY  # of the present step; empty while none is played
+    _camera: CameraMemory | None = None  # before the story
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         return {"story": self._step_html}
@@ -394,8 +378,7 @@ class StoryPanel(Panel):
         context.notes += story_state.notes
         context.story_state = replace(story_state.without_notes(), page=before.page)
         self._number = number
-        text = step_words(now.resulting_scene(), notes, number, problem)
-        self._step_html = text + actions(
+        self._step_html = step_words(now.resulting_scene(), notes, number, problem) + actions(
             button("←", "story:back", hint="Previous step (←)", aria_label="Previous step",
                    disabled=number == 0),
             button("→", "story:on", kind="main", hint="Next step (→)", aria_label="Next step",

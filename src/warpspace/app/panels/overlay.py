@@ -1,35 +1,35 @@
-"""The overlay of the drawing: heading, colour bar, labels, scale bars, pointers of other tabs."""
+"""Panels over the drawing: heading, colour bar, labels, pointers; and the toolbar below it."""
 
 import time
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
-from warpspace.app.browser.html import EMPTY, fill, join, menu, tag, text_box
+from warpspace.analysis.uncertainty.propagation import NOT_STATED
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, field, fill, join, menu, number, tag, text_box
 from warpspace.app.browser.viser_private import queued
-from warpspace.app.documents.legend import (
-    legend_html,
-    numbers_words,
-    order_conditions,
-    part_html,
-    place_words,
-    subject_words,
-    within_limit_words,
-)
+from warpspace.app.documents import legend
 from warpspace.app.drawing.camera import read_room
 from warpspace.app.drawing.labels import Label, axis_labels, note_labels, point_labels
 from warpspace.app.drawing.shapes import SCENE_PER_MM
-from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
+from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.evaluation.point_explanation import pick
+from warpspace.app.panels.conventions import with_travel
 from warpspace.app.panels.design import allowed_words
-from warpspace.app.panels.panel import Context, Panel, Refresh
-from warpspace.app.state.app_state import AppState
+from warpspace.app.panels.panel import Context, Panel, Refresh, setting, tiny
+from warpspace.app.state.app_state import COMPARISON_VIEWS, COMPONENT_NAMES, NOBODY, AppState, Side
 from warpspace.app.state.leaf import Identity
+from warpspace.app.state.look import QUANTITIES, SURFACES, slice_positions
+from warpspace.app.state.tree import leaves, put, spell
 from warpspace.geometry.surfaces import corners
-from warpspace.machine.axes import is_linear
+from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection, is_linear
 from warpspace.picture.formatting import spell_factor
 from warpspace.picture.map_mesh import isoline_labels
 from warpspace.units import Array, spell_short
@@ -42,15 +42,15 @@ class HeadPanel(Panel):
     refresh = Refresh.IMMEDIATE
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        subjects, place = subject_words(picture), place_words(picture)
+        subjects, place = legend.subject_words(picture), legend.place_words(picture)
         head = fill(
             '<div data-piece="reopened"></div><h1>{numbers}</h1>'
             '<div>{place}<span data-piece="head.kept"></span>'
             '<span data-piece="head.allowed"></span></div>{words}'
             '<div data-piece="head.order"></div>',
-            numbers=numbers_words(picture), place=place,
+            numbers=legend.numbers_words(picture), place=place,
             words=(tag("p", " · ".join(subjects), class_="ws-subject") if subjects else EMPTY)
-            + part_html(picture),
+            + legend.part_html(picture),
         )  # fmt: skip
         return {"head": head}
 
@@ -67,17 +67,14 @@ class LegendPanel(Panel):
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         limit_menu = EMPTY
         if not picture.is_difference:
-            (share, is_pass), limit = (
-                within_limit_words(picture),
-                picture.state.specification.limit_um,
-            )
-            box = text_box("state:set.specification.limit_um", f"{limit:g}", size="short",
-                           label="Limit", id="ws-limit")  # fmt: skip
+            share, is_pass = legend.within_limit_words(picture)
+            name, limit = "specification.limit_um", f"{picture.state.specification.limit_um:g}"
+            box = text_box(f"state:set.{name}", limit, size="short", label="Limit", id="ws-limit")
             body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
             limit_menu = menu(share, body, key="limit", hint="Change the limit",
                         kind="ws-pass" if is_pass else "ws-fail")  # fmt: skip
-            limit_menu = Markup(" · ") + limit_menu if place_words(picture) else limit_menu
-        return {"head.kept": limit_menu, "legend": legend_html(picture)}
+            limit_menu = Markup(" · ") + limit_menu if legend.place_words(picture) else limit_menu
+        return {"head.kept": limit_menu, "legend": legend.legend_html(picture)}
 
 
 class OrderPanel(Panel):
@@ -90,7 +87,7 @@ class OrderPanel(Panel):
     refresh = Refresh.IDLE
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        conditions, scene = [*order_conditions(picture)], picture.state.left_behind
+        conditions, scene = [*legend.order_conditions(picture)], picture.state.left_behind
         if scene:
             conditions.append(f"with the errors of this machine; those of “{scene}” are not used")
         allowed = "" if picture.is_difference else allowed_words(picture.drawn_state)
@@ -126,7 +123,6 @@ class OverlayPanel(Panel):
 def _facts(picture: LivePicture) -> dict[str, Any]:
     look, grid = picture.state.look, picture.grid
     isolines = look.isolines and look.surface != "grid"
-    bounds = [piece.grid.bounds_mm for piece in picture.slices]
     return {
         "axes": _labels_json(Identity(axis_labels(picture))),
         "triad": [
@@ -150,7 +146,7 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
         "slices": [
             {"axis": (axis := int((high - low).argmin())), "at": _scene(low)[axis],
              "low": _scene(low), "high": _scene(high)}
-            for low, high in bounds
+            for low, high in [piece.grid.bounds_mm for piece in picture.slices]
         ],
     }  # fmt: skip
 
@@ -209,3 +205,229 @@ class PointerPanel(Panel):
             if tab is not self.context and is_free:
                 tab.page.call("pointer", self.context.client.client_id, label, at)
         return state
+
+
+# --- The toolbar: display of the volume, view direction -------------------------------------------
+
+MACHINES = {"off": "off", "ghost": "ghost", "solid": "solid"}
+VIEWS = {"iso": "Iso", "front": "Front", "right": "Right", "top": "Top"}
+FACTORS = (1, 100, 1000, 10_000, 100_000)
+SWITCHES = (
+    "look.worst", "look.arrows", "look.isolines", "shown.grid_lines", "shown.ghost", "shown.axes",
+    "shown.traces", "look.bars", "shown.dark",
+)  # fmt: skip
+
+
+def _picks(event: str, labels: Mapping[str, object], chosen: str, prefix: str = "") -> Markup:
+    return tag("div", join(
+        button(text, event, prefix + key, pressed=prefix + key == chosen, kind="choice")
+        for key, text in labels.items()
+    ), class_="ws-choices")  # fmt: skip
+
+
+def _leaf_picks(state: AppState, path: str) -> Markup:
+    return _picks(f"state:set.{path}", leaves(state)[path].choices, spell(state, path))
+
+
+def chosen_map(state: AppState) -> str:
+    """Return the quantity that colours the map, as a value of the event ``controls:map``."""
+    chosen = f"{state.look.quantity}.{state.component}"
+    return "limit" if state.look.pass_fail and chosen == "position.norm" else chosen
+
+
+class ControlsPanel(Panel):
+    name = "controls"
+
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
+        camera = self.context.camera
+        lens = html.switch("controls:set.lens", "Orthographic", on=camera.orthographic,
+                      hint="Parallel projection")  # fmt: skip
+        triad = html.fill(
+            '<svg data-piece="triad.axes" viewBox="-46 -46 92 92" aria-hidden="true"></svg>'
+        )
+        menus = (_exaggeration(picture), _colours(picture), _surface(picture),
+                 _machine(picture.state))  # fmt: skip
+        return {
+            "controls": join(menus),
+            "triad": html.menu(triad, _picks("controls:view", VIEWS, camera.view) + lens,
+                               key="view", label="View from", kind="up",
+                               hint="Machine axes; click to select a view direction"),
+        }  # fmt: skip
+
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        context = self.context
+        if action == "map":
+            quantity, _, component = value.partition(".")
+            if value == "limit":
+                quantity, component = "position", "norm"
+            state = put(state, "look.pass_fail", str(int(value == "limit")))
+            state = put(state, "look.quantity", quantity)
+            return put(state, "component", component)
+        if action == "machine" and value in MACHINES:
+            machine = replace(state.machine, shown=value == "solid", ghost=value != "off")
+            return replace(state, machine=machine)
+        if action == "set.travel":
+            return with_travel(state, value)
+        view = value if action == "view" and value in VIEWS else None
+        lens = value == "1" if action == "set.lens" else None
+        if view is not None or lens is not None:
+            context.call_soon(lambda: context.fit_view(view, lens))
+            context.call_soon(self.rerender)
+        return state
+
+
+def _exaggeration(picture: LivePicture) -> Markup:
+    state = picture.state
+    factors = {"auto": "auto", **{str(n): spell_factor(n) for n in FACTORS}}
+    chosen = "auto" if state.exaggeration is None else f"{state.exaggeration:g}"
+    label = "true scale" if picture.exaggeration == 1.0 else spell_factor(picture.exaggeration)
+    name = "state:set.exaggeration"
+    box = text_box(name, f"{picture.exaggeration:.4g}", size="short")
+    body = field("Exaggeration ×", box, name) + _picks(name, factors, chosen)
+    return html.menu(label, body, key="exaggeration", label=f"Exaggeration: {label}", kind="up",
+                hint="Display factor of the errors, 0.001 to 1 000 000")  # fmt: skip
+
+
+def _colours(picture: LivePicture) -> Markup:
+    state, look, chosen = picture.state, picture.state.look, chosen_map(picture.state)
+    uncertainty = picture.uncertainty
+    limit = f"pass / fail at {state.specification.limit_um:g} µm"
+    body: list[Markup] = []
+    label: object = limit
+    for quantity, title in QUANTITIES.items():
+        names = {key: html.lowered(text) for key, text in COMPONENT_NAMES[quantity].items()}
+        if quantity == "uncertainty" and (uncertainty is None or not uncertainty.errors.is_known):
+            text = NOT_STATED if uncertainty is None else "; ".join(uncertainty.errors.remarks())
+            if not picture.is_difference:
+                body += [tag("h3", title), tiny(text)]
+            continue
+        body += [tag("h3", title), _picks("controls:map", names, chosen, f"{quantity}.")]
+        if quantity == picture.quantity and chosen != "limit":
+            label = names[state.component]
+    body.insert(2, _picks("controls:map", {"limit": limit}, chosen))
+    top = look.range_top if look.range_mode == "fixed" else picture.scale.high
+    body += [tag("h3", "Colour range"), _leaf_picks(state, "look.range_mode"),
+             setting(state, "look.range_top", text=f"{top:.4g}")]  # fmt: skip
+    return html.menu(label, join(body), key="map", kind="up", hint="Quantity shown by the colours")
+
+
+def _surface(picture: LivePicture) -> Markup:
+    state, switches = picture.state, [*SWITCHES]
+    if picture.uncertainty is not None:
+        switches += ["look.significant", "look.ellipsoids", "look.unmeasured"]
+    body = [_leaf_picks(state, "look.surface")]
+    if state.look.surface == "slices":
+        axes = slice_positions(state.scene, state.look, state.machine)
+        body += [setting(state, f"look.slices_mm.{axis}", bar=True) for axis in axes]
+        body.append(setting(state, "look.follow"))
+    body += [tag("h3", "Also show"), *(setting(state, path) for path in (*switches, "loop"))]
+    if state.loop is Loop.RELATIVE:
+        body.append(setting(state, "placed"))
+    direction, name = state.scene.model.direction, "controls:set.travel"
+    if state.scene.errors.has_directions or direction != TravelDirection.MEAN:
+        directions = {str(travel): label for travel, label in DIRECTION_WORDS.items()}
+        body.append(
+            field("Direction of travel", html.choice(name, str(direction), directions), name)
+        )
+    body.append(setting(state, "nodes"))
+    return html.menu(SURFACES[state.look.surface], join(body), key="surface", kind="up",
+                hint="Display of the volume")  # fmt: skip
+
+
+def _machine(state: AppState) -> Markup:
+    look = state.machine
+    chosen = "solid" if look.shown else "ghost" if look.ghost else "off"
+    body = _picks("controls:machine", MACHINES, chosen)
+    body += setting(state, "machine.bent") if look.shown else EMPTY
+    return html.menu(f"machine: {chosen}", body, key="machine", kind="up",
+                hint="Display of the machine")  # fmt: skip
+
+
+# --- Comparison -----------------------------------------------------------------------------------
+
+
+class ComparePanel(Panel):
+    """The two sides of a comparison, the displayed one, and the statistics of both."""
+
+    name = "compare"
+    refresh = Refresh.IMMEDIATE
+
+    def dependencies(self, picture: LivePicture) -> tuple[object, ...]:
+        return (Identity(picture.state.comparison), Identity(picture.compared),
+                *self.context.scenes)  # fmt: skip
+
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
+        state, compared = picture.state, picture.compared
+        comparison = state.comparison
+        titles = {title: title for title in (*_own_sides(state), *self.context.scenes)}
+        b = NOBODY if comparison.b is None else comparison.b.title
+        body = [
+            field(title, html.choice(name, side, label), name)
+            for title, name, side, label in (
+                ("A", "compare:set.a", comparison.a.title, titles),
+                ("B", "compare:set.b", b, {NOBODY: NOBODY, **titles}),
+            )
+        ]
+        body.append(button("Set current errors as A", "compare:pin",
+                           hint="Later changes belong to B"))  # fmt: skip
+        if compared is not None:
+            body += [setting(state, "comparison.ghost"), comparison_html(compared)]
+        label = "compare" if compared is None else COMPARISON_VIEWS[compared.view]
+        return {"compared": "" if compared is None else _sides(compared),
+                "compare": html.menu(label, join(body), key="compare", kind="up wide",
+                                hint="Compare two scenes, or errors before and after")}  # fmt: skip
+
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        """Set a side of the comparison; an unknown title is ignored."""
+        chosen, scene = state.comparison, self.context.scenes.get(value)
+        if action == "pin":
+            return with_pin(state)
+        if action == "leave" or (action == "set.b" and value == NOBODY):
+            return with_sides(state, chosen.a, None)
+        side = _own_sides(state).get(value)
+        if side is None and scene is not None:
+            side = replace(scene_side(scene), title=value)
+        if side is None or action not in ("set.a", "set.b"):
+            return state
+        a, b = (side, chosen.b or Side()) if action == "set.a" else (chosen.a, side)
+        return with_sides(state, a, b)
+
+
+def _own_sides(state: AppState) -> dict[str, Side]:
+    chosen = state.comparison
+    used = (Side(), chosen.pinned, chosen.a, chosen.b)
+    return {side.title: side for side in used if side is not None}
+
+
+def _sides(compared: Compared) -> Markup:
+    difference = compared.refused or "Difference of A and B at each node, with its own colours"
+    hints = {"a": compared.titles[0], "b": compared.titles[1], "difference": difference}
+    choices: list[Markup] = []
+    for key, label in COMPARISON_VIEWS.items():
+        choices.append(button(label, "state:set.comparison.shown", key, kind="chip",
+                              hint=hints[key], pressed=compared.view == key,
+                              disabled=bool(compared.refused) and key == "difference"))  # fmt: skip
+    leave = button("✕", "compare:leave", kind="chip", hint="End the comparison",
+                   aria_label="End the comparison")  # fmt: skip
+    return tag("div", join((*choices, leave)), role="group", aria_label="Displayed side")
+
+
+ROWS = {"mean": "mean_um", "RMS": "rms_um", "P95": "p95_um", "max": "max_um"}
+
+
+def comparison_html(compared: Compared) -> Markup:
+    change, lines = compared.difference, list[Markup]()
+    for label, name in ROWS.items():
+        a, b = getattr(compared.a, name), getattr(compared.b, name)
+        node_by_node = "" if change is None else number(getattr(change, name), 2)
+        cells = (number(a, 2), number(b, 2), html.signed(b - a, 2), node_by_node)
+        lines.append(tag("tr", tag("th", label) + join(
+            tag("td", cell, data_compared=f"{label} {side}")
+            for side, cell in zip(("A", "B", "change", "B − A"), cells, strict=True)
+        )))  # fmt: skip
+    head = join(tag("th", label) for label in (
+        "µm", "A", "B", "change", html.lowered("|E_B − E_A|")))  # fmt: skip
+    titles = html.rows(zip("AB", compared.titles, strict=True), kind="ws-titles")
+    note = compared.refused or "change: B − A of each statistic. |E_B − E_A|: at each node."
+    table = tag("table", tag("tr", head) + join(lines), class_="ws-numbers")
+    return titles + table + tiny(html.lowered(note))

@@ -1,34 +1,279 @@
-"""The panels of the page, in the order of rendering."""
+"""The top bar, all commands with their keys, the tasks, and the list of all panels."""
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from textwrap import shorten
 
 from markupsafe import Markup
 
 from warpspace.analysis.registry import entries
-from warpspace.app.browser.html import join, tag
+from warpspace.app.browser.html import EMPTY, button, join, rows, tag, text_box, upload_button
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.panels import machine_editor, overlay
 from warpspace.app.panels.analysis_panel import AnalysisPanel
 from warpspace.app.panels.conventions import ConventionsSection
 from warpspace.app.panels.design import ConceptsPanel, TolerancesPanel
 from warpspace.app.panels.error_list import ErrorsPanel
 from warpspace.app.panels.explanation import DistancePanel, VolumePanel, WorstPanel
-from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog
-from warpspace.app.panels.import_panel import ImportPanel
+from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog, accepted_endings
 from warpspace.app.panels.improve import AdjustPanel, BestPanel, CompensatePanel
-from warpspace.app.panels.machine_editor import (
-    EditorSection,
-    MachinesDialog,
-    PositionsSection,
-    RotarySection,
-)
 from warpspace.app.panels.measurement import CalibratePanel, TestsPanel
 from warpspace.app.panels.note_panels import NoteNumbersPanel, NotesPanel, StoryPanel
-from warpspace.app.panels.overlay import HeadPanel, LegendPanel, OrderPanel, OverlayPanel
-from warpspace.app.panels.panel import Context, Panel, Section
-from warpspace.app.panels.part_panels import PartPanel, ProgramPanel
-from warpspace.app.panels.toolbar import ComparePanel, ControlsPanel
-from warpspace.app.panels.top_bar import HelpDialog, PagePanel, ScenesDialog, StatePanel, TopPanel
-from warpspace.app.state.app_state import TASKS
+from warpspace.app.panels.panel import Context, Dialog, Panel, Refresh, Section, details, quiet
+from warpspace.app.panels.upload_panels import ImportPanel, PartPanel, ProgramPanel
+from warpspace.app.state.app_state import AppState, Exclusions
+from warpspace.app.state.look import TASKS
+from warpspace.app.state.tree import put, toggled
+from warpspace.exceptions import OptionError
+from warpspace.machine.limits import MAX_UPLOAD_BYTES
+
+LONGEST_SENTENCE = 110
+
+
+class StatePanel(Panel):
+    """Events that set a leaf of the state: ``state:set.PATH``."""
+
+    name = "state"
+
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        return put(state, action.removeprefix("set."), value)
+
+
+class TopPanel(Panel):
+    """Scene, open, save, share, report, help; notes, undo and redo if there are any."""
+
+    name = "top"
+
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
+        store = self.context.store
+        steps = (("Undo", "↶", store.undoes, "Ctrl+Z"), ("Redo", "↷", store.redoes, "Ctrl+Shift+Z"))
+        history = (
+            button(sign, f"page:{label.lower()}", kind="quiet", aria_label=label, data_key=label,
+                   hint=f"{label}: {description} ({keys})")
+            for label, sign, description, keys in steps if description
+        )  # fmt: skip
+        hint = "Open a scene, measured errors, or a compensation table (Ctrl+O)"
+        state, title = picture.state, picture.state.origin.title or picture.state.origin.name
+        count = sum(note.status == "open" for note in state.review)
+        notes = [
+            button(f"Notes ({count})" if count else "Notes", "notes:open", kind="quiet",
+                   data_key="notes", hint="Review notes; press N to pin one")
+        ] if state.review or state.page.notes else []  # fmt: skip
+        return {
+            "top": join((
+                tag("strong", "warpspace", class_="ws-brand"),
+                button(title, "page:open", "scenes", kind="ws-scene",
+                       hint="Select another scene"),
+                upload_button("Open", "files", MAX_UPLOAD_BYTES, accepted_endings(), kind="quiet",
+                              hint=hint),
+                button("Save", "page:open", "files", kind="quiet",
+                       hint="Save scene, figures and exports"),
+                button("Share", "files:share", kind="quiet", hint="Copy a link to this view"),
+                button("Report", "page:open", "report", kind="quiet"),
+                *notes,
+                tag("span", "", class_="ws-fill"),
+                *history,
+                button("?", "page:open", "help", kind="quiet", aria_label="Help", hint="Help (H)"),
+            ))
+        }  # fmt: skip
+
+
+class ScenesDialog(Dialog):
+    """The list of scenes: title, machine, description."""
+
+    name, title = "scenes", "Select a scene"
+
+    def body(self, picture: LivePicture) -> Markup:
+        scenes = (
+            tag("button", join((
+                tag("b", title),
+                tag("small", scene.machine.title) if scene.machine.title != title else EMPTY,
+                tag("small", shorten(re.split(r"\.\s", scene.description)[0].rstrip(" .\n"),
+                                     LONGEST_SENTENCE, placeholder=" …"))
+                if scene.description else EMPTY,
+            )), type="button", data_do="scenes:choose", data_value=title,
+                aria_current="true" if scene is picture.state.origin else None)
+            for title, scene in self.context.scenes.items()
+        )  # fmt: skip
+        hint = quiet("To open a file, use Open in the top bar, or drop it on the page.")
+        return tag("div", join(scenes), class_="ws-list", data_list=True) + hint
+
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action != "choose" or value not in self.context.scenes:
+            return state
+        # selecting the current scene resets it
+        return self.closed(replace(state.with_scene(self.context.scenes[value]), page=state.page))
+
+
+# --- Table of all commands, for the keys of the page and the help ---------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A command of the help and the keyboard: an event of the page, with its value."""
+
+    label: str
+    event: str
+    value: str = ""
+    keys: tuple[str, ...] = ()  # in the notation of page.js, the most common one first
+
+    @property
+    def key_label(self) -> str:
+        if not self.keys:
+            return ""
+        *modifiers, key = self.keys[0].split("+")
+        return "+".join((*(word.capitalize() for word in modifiers), key.upper()))
+
+
+# Keys that change the model need a modifier. viser's camera uses A S D Q E.
+COMMANDS = (
+    Command("Undo", "page:undo", keys=("ctrl+z",)),
+    Command("Redo", "page:redo", keys=("ctrl+shift+z", "ctrl+y")),
+    Command("Open a file", "upload", "files", ("ctrl+o",)),
+    Command("Select a scene", "page:open", "scenes"),
+    Command("Save the scene", "files:save", keys=("ctrl+s",)),
+    Command("Save and export", "page:open", "files"),
+    Command("Copy a link to this view", "files:share"),
+    Command("Write a report", "page:open", "report"),
+    Command("Play the story", "story:start"),
+    Command("Pin a note", "notes:pin", keys=("n",)),
+    Command("Notes", "notes:open"),
+    Command("Find an error", "find", keys=("/",)),
+    Command("Fit the view", "page:fit", keys=("f",)),
+    Command("Component: magnitude of the error", "state:set.component", "norm", ("1",)),
+    Command("Component: along x", "state:set.component", "x", ("2",)),
+    Command("Component: along y", "state:set.component", "y", ("3",)),
+    Command("Component: along z", "state:set.component", "z", ("4",)),
+    Command("Exaggeration: automatic", "state:set.exaggeration", "auto", ("x",)),
+    Command("Exaggeration: true scale", "state:set.exaggeration", "1", ("t",)),
+    Command("Grid lines on or off", "page:toggle", "grid_lines", ("g",)),
+    Command("Nominal box on or off", "page:toggle", "ghost", ("b",)),
+    Command("Rotary traces on or off", "page:toggle", "traces", ("c",)),
+    Command("Dark mode on or off", "page:toggle", "dark", ("m",)),
+    Command("Set all errors to zero", "page:zero", keys=("ctrl+alt+0",)),
+    Command("Reset all errors to the scene", "page:reset", keys=("ctrl+alt+r",)),
+    Command("Include all errors", "page:include", keys=("ctrl+alt+l",)),
+    Command("Help and all commands", "page:open", "help", ("ctrl+k", "h", "?", "shift+?")),
+    Command("First steps", "page:tour"),
+)
+
+
+def key_events() -> Mapping[str, str]:
+    return {key: f"{c.event}={c.value}".rstrip("=") for c in COMMANDS for key in c.keys}
+
+
+FIRST_HELP = (
+    ("Rotate, pan, zoom", "drag, drag with the right button, wheel"),
+    ("Contributions at a point", "click it on the volume"),
+    ("Enter an exact number", "type digits while a slider has the focus"),
+    ("Next control, activate it", "Tab, then Enter or Space"),
+    ("Move the camera", "A S D Q E"),
+)
+MEANINGS = (
+    ("Solid box", "working volume, each point displaced by its error × exaggeration"),
+    ("Dashed box", "nominal working volume, without errors"),
+    ("Exaggeration", "display factor of the errors; numbers are not exaggerated"),
+    ("Colours", "magnitude or a component (x, y, z) of the error, in the unit of the colour bar"),
+    ("Error", "actual − nominal; a correction has the opposite sign"),
+    ("Mean, P95, max", "statistics of the magnitude of the error over the working volume"),
+)
+
+
+def _find_commands(query: str) -> list[Command]:
+    search_words = query.lower().split()
+    return [c for c in COMMANDS if all(word in c.label.lower() for word in search_words)]
+
+
+class HelpDialog(Dialog):
+    """All commands with a search box; mouse and keyboard; legend of the drawing."""
+
+    name, title = "help", "Help"
+
+    def body(self, picture: LivePicture) -> Markup:
+        query, scene = picture.state.page.command, picture.state.scene
+        label = "Find a command"
+        box = text_box("state:set.page.command", query, label=label, placeholder=label, live=True,
+                       data_enter="help:first", autofocus=True)  # fmt: skip
+        commands = join(
+            tag("button", tag("kbd", command.key_label) + command.label, type="button",
+                data_do="help:run", data_value=command.label)
+            if ":" in command.event else tag("p", tag("kbd", command.key_label) + command.label)
+            for command in _find_commands(query)
+        )  # fmt: skip
+        about = " ".join(scene.description.split())
+        return join((
+            tag("div", box + tag("div", commands, class_="ws-list ws-columns"), data_list=True),
+            tag("h3", "Mouse and keyboard"), rows(FIRST_HELP, "ws-keys"),
+            tag("h3", "Legend"), rows(MEANINGS, "ws-keys"),
+            quiet("Keys are active except while text is entered. After an interruption of the"
+                " connection, the state of a tab is available for ten minutes."),
+            *((tag("h3", scene.title), tag("p", about)) if about else ()),
+        ))  # fmt: skip
+
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        query = state.page.command
+        matches = [command for command in _find_commands(query) if ":" in command.event]
+        is_first = action == "first" and bool(query)
+        if action == "run":
+            matches = [command for command in matches if command.label == value]
+        if not matches or not (is_first or action == "run"):
+            return state
+        self.context.send(matches[0].event, matches[0].value)
+        return self.closed(state)
+
+
+class PagePanel(Panel):
+    """Events of the whole page: tasks, sections, dialogs, undo, redo, and all errors."""
+
+    name = "page"
+    refresh = Refresh.IMMEDIATE
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        context.page.call("keys", key_events())
+
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
+        # an open dialog renders its own content
+        return {} if picture.state.page.window else {"window": ""}
+
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        context = self.context
+        actions: dict[str, Callable[[], None]] = {
+            "undo": partial(self._go, "undo", context.store.undo),
+            "redo": partial(self._go, "redo", context.store.redo),
+            "fit": context.fit_view,
+            "tour": partial(context.page.call, "tour", True),
+            "close": context.dialog_closed,
+        }
+        if action in actions:
+            context.call_soon(actions[action])
+        updates: dict[str, Callable[[], AppState]] = {
+            "task": partial(put, state, "page.task", value),
+            "fold": partial(toggled, state, "page.open", value),
+            "open": partial(put, put(state, "page.command", ""), "page.window", value),
+            **dict.fromkeys(("close", "tour"), partial(put, state, "page.window", "")),
+            "include": partial(replace, state, exclusions=Exclusions()),
+            "zero": state.zeroed,
+            "reset": state.reset,
+        }
+        is_on = getattr(state.shown, value, None) if action == "toggle" else None
+        if isinstance(is_on, bool):
+            return replace(state, shown=replace(state.shown, **{value: not is_on}))
+        return updates[action]() if action in updates else state
+
+    def _go(self, name: str, go: Callable[[], str]) -> None:
+        try:
+            description = go()
+        except OptionError as error:
+            self.context.notes.append(str(error))
+            return
+        done = {"undo": "Undone", "redo": "Redone"}[name]
+        self.context.notify(f"{done}: {description}" if description else f"Nothing to {name}")
+
+
+# --- The tasks, and all panels --------------------------------------------------------------------
 
 PANELS: dict[str, type[AnalysisPanel]] = {
     "calibrate": CalibratePanel, "adjust": AdjustPanel, "compensate": CompensatePanel,
@@ -59,7 +304,6 @@ class TasksPanel(Panel):
         }
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        """Render the tabs, and an empty place for each section."""
         task = picture.state.page.task
         tabs = join(
             tag(
@@ -73,8 +317,7 @@ class TasksPanel(Panel):
         places = _places(name for name in names if name not in RARE)
         rare = _places(name for name in names if name in RARE)
         if rare:
-            places += tag("details", tag("summary", "More analyses") + rare, class_="ws-more",
-                          data_key=f"more.{task}")  # fmt: skip
+            places += details("More analyses", rare, kind="more", data_key=f"more.{task}")
         return {
             "tasks": tag("h2", "Tasks", class_="ws-heard")
             + tag("div", tabs, role="tablist", aria_label="Tasks", class_="ws-tabs")
@@ -88,17 +331,19 @@ def _places(names: Iterable[str]) -> Markup:
 
 
 def build_panels(context: Context) -> list[Panel]:
-    of_tasks = (WorstPanel, VolumePanel, ImportPanel, TestsPanel)
-    of_machine = (PositionsSection, ConventionsSection, RotarySection, EditorSection)
+    kinds_before = (WorstPanel, VolumePanel, ImportPanel, TestsPanel)
+    kinds_after = (machine_editor.PositionsSection, ConventionsSection,
+                   machine_editor.RotarySection, machine_editor.EditorSection)  # fmt: skip
     sections: list[Section] = [
-        *(kind(context) for kind in of_tasks),
+        *(kind(context) for kind in kinds_before),
         *(PANELS.get(entry.name, AnalysisPanel)(context, entry) for entry in entries()),
-        *(kind(context) for kind in of_machine),
+        *(kind(context) for kind in kinds_after),
     ]
     kinds = (
-        TopPanel, HeadPanel, LegendPanel, OrderPanel, ControlsPanel, ComparePanel, ErrorsPanel,
-        OverlayPanel, StatePanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
-        MachinesDialog, FilesDialog, ReportDialog, HelpDialog, StoryPanel,
+        TopPanel, overlay.HeadPanel, overlay.LegendPanel, overlay.OrderPanel,
+        overlay.ControlsPanel, overlay.ComparePanel, ErrorsPanel, overlay.OverlayPanel, StatePanel,
+        PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
+        machine_editor.MachinesDialog, FilesDialog, ReportDialog, HelpDialog, StoryPanel,
     )  # fmt: skip
     panels = [kind(context) for kind in kinds]
     return [*panels, TasksPanel(context, sections), *sections, BestPanel(context)]

@@ -22,20 +22,8 @@ from markupsafe import Markup
 from viser import ClientHandle, ViserServer
 
 from warpspace.analysis.description import Result
-from warpspace.app.browser.html import (
-    EMPTY,
-    button,
-    choice,
-    field,
-    fold,
-    ident,
-    join,
-    number,
-    slider,
-    switch,
-    tag,
-    text_box,
-)
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, join, tag, text_box
 from warpspace.app.browser.incoming import LONGEST_VALUE, Event, Events, event_of
 from warpspace.app.browser.page import Page
 from warpspace.app.documents.output_services import CancelledError, Services
@@ -114,11 +102,9 @@ class Context:
         self.notes += self.store.apply(update_tab, by=self.mark_changed, at=self.changed_at)
 
     def wake(self) -> None:
-        """Wake the session up."""
         self._wake.set()
 
     def receive(self, message: Events) -> None:
-        """Queue events of the page."""
         events = [event_of(*event) for event in message.events]
         if len([*filter(_is_file, self.events), *filter(_is_file, events)]) > MOST_FILES:
             text = f"More than {MOST_FILES} files at once; select fewer and try again"
@@ -251,15 +237,12 @@ class Section(Panel):
     sentence = ""  # its purpose, shown as a hint of the title
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
-        """Return the inputs of its body."""
         return (id(picture),)
 
     def body(self, picture: LivePicture) -> Markup:
-        """Render the content below the title."""
         raise NotImplementedError
 
     def heading(self, picture: LivePicture) -> str:
-        """Return the title of the unfolded section."""
         return self.title
 
     def is_open(self, state: AppState) -> bool:
@@ -275,7 +258,9 @@ class Section(Panel):
         is_open = self.is_open(picture.state)
         body = self.body(picture) if is_open else EMPTY
         title = self.heading(picture) if is_open else self.title
-        section = fold(self.name, title, body, opens="page:fold", open_=is_open, hint=self.sentence)
+        section = html.fold(
+            self.name, title, body, opens="page:fold", open_=is_open, hint=self.sentence
+        )
         return {f"section.{self.name}": section}
 
 
@@ -304,25 +289,42 @@ def actions(*buttons: Markup) -> Markup:
     return tag("div", join(buttons), class_="ws-actions")
 
 
+def tiny(text: object) -> Markup:
+    return tag("p", text, class_="ws-tiny")
+
+
+def quiet(text: object) -> Markup:
+    return tag("p", text, class_="ws-quiet")
+
+
+def alert(text: object) -> Markup:
+    return tag("p", text, class_="ws-problem", role="alert")
+
+
+def details(heading: object, *parts: object, kind: str = "options", **extra: object) -> Markup:
+    """Render parts that are folded away under a heading."""
+    return tag("details", join((tag("summary", heading), *parts)), class_=f"ws-{kind}", **extra)
+
+
 def setting(state: AppState, path: str, *, text: str = "", bar: bool = False) -> Markup:
     """Render the control of a leaf of the state: a switch, a list, a text box or a slider."""
     leaf, present, name = leaves(state)[path], value(state, path), f"state:set.{path}"
     if leaf.kind == "switch":
-        return switch(name, leaf.label, on=bool(present), hint=leaf.hint)
+        return html.switch(name, leaf.label, on=bool(present), hint=leaf.hint)
     label, control = leaf.label, text_box(name, spell(state, path))
     if leaf.kind == "choice":
-        control = choice(name, str(present), leaf.choices)
+        control = html.choice(name, str(present), leaf.choices)
     elif leaf.kind == "lines":
-        control = tag("textarea", str(present), class_="ws-box", id=ident(name), rows=3,
+        control = tag("textarea", str(present), class_="ws-box", id=html.ident(name), rows=3,
                       data_set=name, maxlength=LONGEST, placeholder=leaf.hint or None)  # fmt: skip
     elif leaf.kind == "number":
         text = text or f"{present:.6g}"
         control = text_box(name, text, size="short", inputmode="decimal")
         if bar and leaf.span is not None:
             span, label = leaf.span, path.rpartition(".")[2]
-            control = slider(name, present, span.low, span.high, span.step, label=leaf.label,
+            control = html.slider(name, present, span.low, span.high, span.step, label=leaf.label,
                              twin=name, text=f"{text} {leaf.unit}") + control  # fmt: skip
-    return field(label, control, name, leaf.unit, leaf.hint)
+    return html.field(label, control, name, leaf.unit, leaf.hint)
 
 
 # --- Jobs: long computations in threads of their own, with progress, cancellable ------------------
@@ -364,15 +366,11 @@ class Jobs:
     def busy(self) -> bool:
         return self._job is not None
 
-    def queue(self, name: str, work: Callable[[Job], None]) -> None:
-        """Start a job after the present one. For the session."""
-        if not self.start(name, work):
-            self._waiting.append((name, work))
-
-    def start(self, name: str, work: Callable[[Job], None]) -> bool:
-        """Start a job; return False if another one is running. For the session."""
+    def start(self, name: str, work: Callable[[Job], None], *, waits: bool = False) -> bool:
+        """Start a job, now or after a running one; return False if it cannot. For the session."""
         if self._job is not None:
-            return False
+            self._waiting += [(name, work)] if waits else []
+            return waits
         self._job = job = Job(name, self._on_progress)
         self._panel.context.jobs.add(job)
         run = partial(self._run, job, work)
@@ -381,17 +379,15 @@ class Jobs:
         return True
 
     def cancel(self) -> None:
-        """Cancel the running job and discard its result."""
         if self._job is not None:
             self._job.set()
             self._end(self._job, None)
 
     def html(self) -> Markup:
-        """Render the name and the progress of the running job."""
         job = self._job
         if job is None:
             return EMPTY
-        share = number(100.0 * job.share, 0) if job.share else None
+        share = html.number(100.0 * job.share, 0) if job.share else None
         bar = tag("progress", "", max=100, value=share, aria_label=job.name)
         label = tag("span", f"{job.name}: {share} %" if share else f"{job.name} …")
         cancel = button("Cancel", f"{self._panel.name}:cancel")

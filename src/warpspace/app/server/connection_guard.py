@@ -33,8 +33,6 @@ HEADERS = {
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of one server."""
-
     sessions: int = 64  # open tabs
     # largest message of a page: a picture of the view. A file has 15.5 MB at most.
     message_bytes: int = 16 * 2**20
@@ -50,21 +48,18 @@ MOST_EARLY = 4  # messages of a page that are stored until its session exists
 class Rate:
     """Counts messages against a rate that may be exceeded for a moment."""
 
-    def __init__(
-        self, per_second: float, burst: int, clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        self._per_second, self._burst, self._clock = per_second, burst, clock
-        self._left, self._last = float(burst), clock()
+    def __init__(self, limits: Limits, clock: Callable[[], float] = time.monotonic) -> None:
+        self._limits, self._clock = limits, clock
+        self._left, self._last = float(limits.burst), clock()
 
     def take(self) -> bool:
         """Count a message; False above the limit."""
         now = self._clock()
-        self._left = min(self._burst, self._left + (now - self._last) * self._per_second)
-        self._last = now
-        if self._left < 1.0:
-            return False
-        self._left -= 1.0
-        return True
+        refilled = self._left + (now - self._last) * self._limits.messages_per_second
+        available, self._last = min(self._limits.burst, refilled), now
+        is_taken = available >= 1.0
+        self._left = available - is_taken
+        return is_taken
 
 
 class Guard:
@@ -130,7 +125,7 @@ class TabConnection(ServerConnection):
 
     def start(self, guard: Guard) -> None:
         self._guard = guard
-        self._rate = Rate(guard.limits.messages_per_second, guard.limits.burst)
+        self._rate = Rate(guard.limits)
         self._closing: asyncio.Task[None] | None = None
         self._early: list[Events] = []
         self._take: Callable[[Events], None] | None = None

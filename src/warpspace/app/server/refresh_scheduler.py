@@ -39,7 +39,6 @@ class RefreshScheduler:
         return True
 
     def record_picture(self) -> None:
-        """Start the waiting times of a new picture."""
         self.restart_idle()
         if self._waiting_since is None:
             self._waiting_since = self._changed_at

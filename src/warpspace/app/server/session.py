@@ -54,13 +54,12 @@ class Display:
 
     def __init__(self, context: Context) -> None:
         self._context = context
-        self._scheduler = RefreshScheduler()
+        self.scheduler = RefreshScheduler()
         context.rerender, context.dialog_closed = self._renew, self._closed
-        context.restart_idle = self._scheduler.restart_idle
+        context.restart_idle = self.scheduler.restart_idle
         self.layers: tuple[BoxLayer | MovingLayer, ...] = ()
         self.panels: dict[str, Panel] = {}
         self._rendered: dict[Panel, object] = {}  # dependencies on the page; None where hidden
-        self._live: list[Panel] = []  # rendered while a slider is dragged
 
     def add(
         self,
@@ -70,8 +69,6 @@ class Display:
     ) -> None:
         self.layers = (*self.layers, *layers)
         self.panels |= {panel.name: panel for panel in panels}
-        classes = (Refresh.IMMEDIATE, Refresh.THROTTLED)
-        self._live = [panel for panel in self.panels.values() if panel.refresh in classes]
         self._write(panels, picture)
         self._record(picture)
 
@@ -84,19 +81,20 @@ class Display:
         # panels come into sight where the look of the page changes
         before = self._context.picture
         same_page = before is not None and before.state.page is picture.state.page and not force
-        panels = self._live if same_page else self.panels.values()
+        classes = (Refresh.IMMEDIATE, Refresh.THROTTLED) if same_page else tuple(Refresh)
+        panels = [panel for panel in self.panels.values() if panel.refresh in classes]
         self._write([panel for panel in panels if self._is_due(panel, picture)], picture)
         self._record(picture)
 
     def _is_due(self, panel: Panel, picture: LivePicture) -> bool:
         # panels appear and disappear at once
-        if panel.is_visible(picture.state) != (self._rendered.get(panel) is not None):
-            return True
-        return self._scheduler.is_due(panel, picture)
+        was_visible = self._rendered.get(panel) is not None
+        is_changed = panel.is_visible(picture.state) != was_visible
+        return is_changed or self.scheduler.is_due(panel, picture)
 
     def _record(self, picture: LivePicture) -> None:
         self._context.picture = picture
-        self._scheduler.record_picture()
+        self.scheduler.record_picture()
 
     def _renew(self, panel: Panel) -> None:
         if self._context.picture is not None:
@@ -118,16 +116,11 @@ class Display:
                     pieces |= panel.render(picture)
         self._context.page.put(pieces)
 
-    @property
-    def due_in_s(self) -> float | None:
-        """Time until `settle` has to be called; None where nothing is to be rendered."""
-        return self._scheduler.due_in_s
-
     def settle(self, picture: LivePicture, guarded: Guarded) -> None:
         """Render the next panel that is due; one at a time, so that a slider never waits long."""
-        queue = self._scheduler.queue
+        queue = self.scheduler.queue
         if not queue:
-            forced = self._scheduler.start_pass(self.panels.values())
+            forced = self.scheduler.start_pass(self.panels.values())
             if forced is not None:
                 self._rendered |= dict.fromkeys(forced)
                 for layer in self.layers:
@@ -197,26 +190,12 @@ class Session:
     def state(self) -> AppState:
         return self.context.state
 
-    @property
-    def _tabs(self) -> Iterable[Context]:
-        return [self.context] if self._review_tabs is None else self._review_tabs()
-
-    def start(self) -> None:
-        self.worker.start()
-
     def stop(self) -> None:
         self._stopped.set()
         for job in tuple(self.context.jobs):
             job.set()
         self.context.wake()
         self.context.store.unsubscribe(self.context.mark_changed)
-
-    def rename(self, token: str) -> None:
-        self.token = token
-        self.context.page.call("rename", token)
-
-    def record(self) -> TabRecord:
-        return TabRecord(self.context.store, self.context.camera.remember())
 
     def use(self, store: StateStore) -> None:
         self.context.store.unsubscribe(self.context.mark_changed)
@@ -237,7 +216,7 @@ class Session:
     def _turn(self) -> None:
         due_at, stage = self._surroundings_due_at, self.context.stage
         waits = (
-            self.display.due_in_s,
+            self.display.scheduler.due_in_s,
             None if due_at is None else max(0.0, due_at - time.monotonic()),
             None if stage is None else stage.wait_s,
         )
@@ -254,7 +233,7 @@ class Session:
             self.run_guarded(partial(self.draw_surroundings, picture))
         if stage is not None and stage.wait_s == 0.0:
             self.run_guarded(stage.turn)
-        if self.display.due_in_s == 0.0:
+        if self.display.scheduler.due_in_s == 0.0:
             self.run_guarded(partial(self._settle, picture))
 
     def run_guarded(self, step: Callable[[], object]) -> None:
@@ -282,9 +261,9 @@ class Session:
         title: str = "The change was reverted",
     ) -> bool:  # fmt: skip
         """Replace a state that cannot be evaluated; return False where that changes nothing."""
-        context, tabs = self.context, self._tabs
+        context, tabs = self.context, self._review_tabs
         if context.story_state is not None:
-            tabs, story = [context], self.display.panels[StoryPanel.name]
+            tabs, story = None, self.display.panels[StoryPanel.name]
             self.run_guarded(partial(story.handle, self.state, "end", ""))
         elif failed.state is target.state and failed.page is target.page:
             return False
@@ -293,7 +272,7 @@ class Session:
                 context.page_look = target.page
             if not context.store.restore(target, failed.state):
                 return True  # another tab has replaced it
-        self._report(error, tabs, title=title)
+        self._report(error, [context] if tabs is None else tabs(), title=title)
         context.wake()
         return True
 
@@ -432,7 +411,7 @@ class Session:
     def _settle(self, picture: LivePicture) -> None:
         with turn(), self.context.page.batch():
             self.display.settle(picture, self._render)
-        if self.display.due_in_s is None:
+        if self.display.scheduler.due_in_s is None:
             self._settled = self._shown
 
     def _render(self, part: object, step: Callable[[], object]) -> None:

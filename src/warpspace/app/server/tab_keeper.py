@@ -18,13 +18,7 @@ from functools import partial
 
 import msgspec
 
-from warpspace.app.documents.scene_file import (
-    MAX_LINK,
-    named_link,
-    open_link,
-    open_text,
-    state_to_toml,
-)
+from warpspace.app.documents import scene_file
 from warpspace.app.documents.transfers import safe_name
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.compare import without_table
@@ -41,21 +35,15 @@ from warpspace.scene.model import Scene
 RETENTION_S = 600.0
 MAX_CLOSED_TABS = 64
 MAX_HISTORY_BYTES = 256 * 2**20  # held by the histories of all of them
-_TOKEN = re.compile(r"[0-9a-f]{32}")
+TAB_TOKEN = re.compile(r"[0-9a-f]{32}")
 
 
 def new_token() -> str:
     return secrets.token_hex(16)
 
 
-def is_token(text: str) -> bool:
-    return _TOKEN.fullmatch(text) is not None
-
-
 @dataclass(frozen=True, slots=True)
 class TabRecord:
-    """State and camera of a closed tab."""
-
     store: StateStore  # state and history
     camera: CameraMemory | None
 
@@ -118,9 +106,10 @@ def page_copy_text(state: AppState, camera: CameraMemory | None, scenes: Sequenc
     single = replace(bare, comparison=Comparison())
     for candidate in (bare,) if single == bare else (bare, single):
         with suppress(OptionError):
-            file, link = state_to_toml(candidate, camera), named_link(candidate, camera, scenes)
+            file = scene_file.state_to_toml(candidate, camera)
+            link = scene_file.named_link(candidate, camera, scenes)
             left_out = missing if candidate is bare else (*missing, COMPARISON)
-            short = link if link and len(link) <= MAX_LINK else ""
+            short = link if link and len(link) <= scene_file.MAX_LINK else ""
             copy = PageCopy(file, candidate.scene.name, short, left_out)
             text = msgspec.json.encode(copy).decode()
             if len(text) <= MAX_KEPT_TEXT:
@@ -138,26 +127,23 @@ def read_page_copy(
         raise OptionError("the copy in this tab is damaged") from None
     missing = (*NEVER_RESTORED, *copy.missing)
     with suppress(WarpspaceError):
-        state, camera = open_link(copy.link, scenes)
-        if state_to_toml(state, camera) == copy.file:
+        state, camera = scene_file.open_link(copy.link, scenes)
+        if scene_file.state_to_toml(state, camera) == copy.file:
             return state, camera, missing
-    state, camera = open_text(copy.file, safe_name(copy.name, "kept"), "the copy in this tab")
+    name = safe_name(copy.name, "kept")
+    state, camera = scene_file.open_text(copy.file, name, "the copy in this tab")
     return state, camera, (*missing, START_VALUES)
 
 
-RESTORED_TITLE = "This tab is restored"
 RESTORED = (
     "The server was restarted, or the tab was disconnected for more than ten minutes. Scene,"
     " errors, view, camera, picked point and comparison are restored unless named below. Undo"
     " returns to the scene that the server was started with."
 )
-MISSING = "Not restored: {}."
-REFUSED_TITLE = "This tab could not be restored"
 REFUSED = (
     "The server was restarted, or the tab was disconnected for more than ten minutes. The tab"
     " starts afresh, since its copy cannot be used here: {}"
 )
-JOINED_TITLE = "You are in the shared review as it is now"
 JOINED = (
     "The server was restarted, and the review has been changed since. The copy in this tab was not"
     " restored."
@@ -208,12 +194,12 @@ class TabKeeper(Panel):
     def _restore(self, text: str) -> None:
         context, say = self.context, partial(self.context.page.call, "server.say")
         if self._shared and context.store.is_edited:
-            say(JOINED_TITLE, [JOINED])
+            say("You are in the shared review as it is now", [JOINED])
             return
         try:
             state, camera, missing = read_page_copy(text, context.scenes.fixed)
         except WarpspaceError as error:
-            say(REFUSED_TITLE, [REFUSED.format(error)])
+            say("This tab could not be restored", [REFUSED.format(error)])
             return
         context.show_opened(state, camera)
-        say(RESTORED_TITLE, [RESTORED, MISSING.format("; ".join(missing))])
+        say("This tab is restored", [RESTORED, f"Not restored: {'; '.join(missing)}."])

@@ -21,7 +21,7 @@ from typing import Any, Self
 import viser
 
 from warpspace.app.browser.page import page_script
-from warpspace.app.browser.viser_private import connection_of, send_script_to_all, serve_with
+from warpspace.app.browser.viser_private import connection_of, send_script, serve_with
 from warpspace.app.documents.output_services import Services
 from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.drawing.box import surface
@@ -31,7 +31,7 @@ from warpspace.app.panels.panel import Context
 from warpspace.app.server.connection_guard import Guard, TabConnection
 from warpspace.app.server.request_policy import Access, RequestPolicy, plain_address
 from warpspace.app.server.session import Session
-from warpspace.app.server.tab_keeper import RETENTION_S, TabMemory, TabRecord, is_token, new_token
+from warpspace.app.server.tab_keeper import RETENTION_S, TAB_TOKEN, TabMemory, TabRecord, new_token
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
 from warpspace.exceptions import OptionError
@@ -232,10 +232,15 @@ class Viewer:
         access: Access | None = None,
     ) -> None:
         self.address = resolve_host(host)
+        self.is_local = is_local(self.address)
         access = access or Access()
         self.token = access.choose_token(local=self.is_local)
         self._services = replace(services or Services(), token=self.token)
         self.port = free_port(self.address, port)
+        self.url = page_url(self.address, self.port)
+        query = "" if self.token is None else f"/?token={self.token}"
+        self.link = self.url + query  # for a browser of this machine
+        self.network_link = page_url(reachable_address(self.address), self.port) + query
         policy = RequestPolicy(
             served_names(host, self.address),
             self.port,
@@ -253,33 +258,12 @@ class Viewer:
         self._shared = StateStore(self._start) if shared else None
         self.server = _serve(self.address, self.port, Guard(policy))
         light_scene(self.server.scene)
-        send_script_to_all(self.server, f"{page_script()}\nwarpspacePage.arrive();")
+        send_script(self.server, f"{page_script()}\nwarpspacePage.arrive();")
         self.server.on_client_connect(self._connect)
         self.server.on_client_disconnect(self._disconnect)
         # so that the first tab does not wait for it
         self._warming = threading.Thread(target=self._warm, name="warpspace-warm", daemon=True)
         self._warming.start()
-
-    @property
-    def url(self) -> str:
-        return page_url(self.address, self.port)
-
-    @property
-    def link(self) -> str:
-        """Address with token, for a browser of this machine."""
-        return self._with_token(self.url)
-
-    @property
-    def network_link(self) -> str:
-        """Address with token, for a browser of another machine."""
-        return self._with_token(page_url(reachable_address(self.address), self.port))
-
-    def _with_token(self, url: str) -> str:
-        return url if self.token is None else f"{url}/?token={self.token}"
-
-    @property
-    def is_local(self) -> bool:
-        return is_local(self.address)
 
     @property
     def sessions(self) -> tuple[Session, ...]:
@@ -295,18 +279,17 @@ class Viewer:
         if not isinstance(connection, TabConnection):
             return  # closed meanwhile
         store = self._shared.joined() if self._shared else StateStore(self._start)
-        scenes = SceneList(self._scenes)
-        context = Context(self.server, client, store, scenes, self._services)
+        context = Context(self.server, client, store, SceneList(self._scenes), self._services)
         context.notes += self._notes
         tabs = (lambda: [tab.context for tab in self.sessions]) if self._shared else None
         session = Session(context, self._live, self.claim, review_tabs=tabs)
         with self._lock:
             self._sessions[client.client_id] = session
         connection.listen(context.receive)
-        session.start()
+        session.worker.start()
 
     def claim(self, session: Session, token: str) -> TabRecord | None:
-        if not is_token(token):
+        if TAB_TOKEN.fullmatch(token) is None:
             return None
         with self._lock:
             if session not in self._sessions.values():
@@ -319,7 +302,8 @@ class Viewer:
             # a duplicated tab, or one whose previous connection is not closed yet
             twin = twins[0].context.store
             record = TabRecord(twin.joined() if self._shared else twin.copy(), None)
-            session.rename(new_token())
+            session.token = new_token()
+            session.context.page.call("rename", session.token)
         return record
 
     async def _disconnect(self, client: viser.ClientHandle) -> None:
@@ -328,7 +312,9 @@ class Viewer:
             if session is None:
                 return
             try:
-                self.memory.keep(session.token, session.record())
+                context = session.context
+                record = TabRecord(context.store, context.camera.remember())
+                self.memory.keep(session.token, record)
             finally:
                 session.stop()
         asyncio.get_running_loop().call_later(RETENTION_S + 1.0, self._forget)

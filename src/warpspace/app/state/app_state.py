@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from warpspace.app.state.leaf import Span, describe, described, error_names
 from warpspace.app.state.look import (
+    DisplayOptions,
     Look,
     MachineLook,
+    PageLook,
     RotaryLook,
     clamped,
     linear_spans,
@@ -31,7 +33,7 @@ from warpspace.machine.limits import LIVE_NODES, MAX_ERROR, MAX_LENGTH_MM, PROBA
 from warpspace.parts.interpreter import program_lines
 from warpspace.parts.workpiece import Workpiece, load_workpiece
 from warpspace.scene.model import Scene
-from warpspace.scene.notes import KINDS, Note, NoteAnchor
+from warpspace.scene.notes import Note, NoteAnchor
 
 if TYPE_CHECKING:
     from warpspace.formats.compensation.controller import Controller
@@ -43,7 +45,6 @@ PLACE = Span(-MAX_LENGTH_MM, MAX_LENGTH_MM, 1.0)  # mm and degrees
 LIMIT_UM = Span(1.0, 300.0, 0.5)
 PERCENT = Span(100.0 * PROBABILITY[0], 100.0 * PROBABILITY[1], 0.1)
 START_NODES, START_UM = 21, 50.0
-TASKS = {word.lower(): word for word in ("Understand", "Measure", "Improve", "Design", "Machine")}
 COMPONENT_NAMES = {
     "position": {"norm": "|E| length", "x": "E_x", "y": "E_y", "z": "E_z"},
     "orientation": {
@@ -70,19 +71,6 @@ _load_workpiece = lru_cache(maxsize=4)(load_workpiece)
 
 
 @dataclass(frozen=True, slots=True)
-class DisplayOptions:
-    traces: bool = described(
-        True, "Rotary traces", hint="Circles and arcs of the table: nominal light, actual dark."
-    )
-    ghost: bool = described(True, "Nominal box", hint="The working volume without errors, dashed.")
-    grid_lines: bool = described(True, "Grid lines", hint="Lines of the grid on the deformed box.")
-    axes: bool = described(True, "Axes", hint="Coordinates of the machine in mm.")
-    dark: bool = described(
-        False, "Dark mode", hint="Light lines on a dark ground; the colours of the map stay."
-    )
-
-
-@dataclass(frozen=True, slots=True)
 class Exclusions:
     """Parameters that are excluded, and those that exclude all others."""
 
@@ -106,7 +94,6 @@ class Exclusions:
         return bool(self.excluded or self.only)
 
     def active(self, key: str) -> bool:
-        """Return whether a parameter is not excluded."""
         return key not in self.excluded and (not self.only or key in self.only)
 
     def within(self, keys: Collection[str]) -> "Exclusions":
@@ -115,8 +102,6 @@ class Exclusions:
 
 @dataclass(frozen=True, slots=True)
 class Specification:
-    """Requirements of a design: limit, place of evaluation, tolerances and their costs."""
-
     limit_um: float = described(START_UM, "|E| allowed", span=LIMIT_UM, unit="µm")
     # at one random point of each machine (as in the thesis), or at its worst point (the default)
     over: str = described(
@@ -219,35 +204,6 @@ class PartLook:
     @property
     def is_empty(self) -> bool:
         return (self.mesh is None or not self.shown) and self.program is None
-
-
-@dataclass(frozen=True, slots=True)
-class PageLook:
-    task: str = described("understand", "Task", choices=TASKS, linked="")
-    open: frozenset[str] = described(
-        frozenset({"worst", "compensate", "adjust", "concepts", "allocate", "import"}),
-        "Open sections",
-        linked="",
-    )
-    # error with the unfolded row: selected, or changed last; empty for none
-    row: str = described(
-        "", "Unfolded error", choices=lambda state: {"": "none", **error_names(state)}, linked=""
-    )
-    query: str = described("", "Search of errors", linked="")
-    command: str = described("", "Search of commands", linked="")
-    window: str = described("", "Open window", linked="")
-    # "list", "new", or the edited note; empty where the tasks are shown
-    notes: str = described("", "Notes", linked="")
-    figure: str = described("", "Figure", linked="")
-    # draft of a note
-    note_kind: str = described("note", "Kind", choices={k: k for k in KINDS}, linked="")
-    note_place: str = described("point", "About", choices=lambda state: {
-        "point": "clicked or worst point", "whole": "the whole",
-        **{axis: f"body {axis}" for axis in state.scene.machine.axes},
-    }, linked="")  # fmt: skip
-    note_text: str = described("", "Text", kind="lines", hint="What is to be seen here?", linked="")
-    author: str = described("", "Your name", hint="Kept in this browser", linked="")
-    questions: str = described("", "Open questions", kind="lines", hint="One per line", linked="")
 
 
 @dataclass(frozen=True)

@@ -63,9 +63,7 @@ def half_width_span(state: AppState, key: str) -> Span:
 def with_scene_tolerances(state: AppState) -> AppState:
     original = state.origin.tolerances
     # an edited machine may lack axes of the scene
-    tolerances = {
-        key: original.individual[key] for key in original.individual if key in state.amplitudes
-    }
+    tolerances = {key: at for key, at in original.individual.items() if key in state.amplitudes}
     return replace(state, tolerances=replace(original, individual=tolerances))
 
 

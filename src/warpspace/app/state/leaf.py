@@ -21,11 +21,11 @@ class Unreadable(ValueError):  # noqa: N818 - handled where texts are parsed
     """An invalid text; the message states what was expected."""
 
 
+@dataclass(frozen=True, eq=False)
 class Identity:
     """An object as part of a key, compared by identity; referenced, so that its id stays unique."""
 
-    def __init__(self, target: Any) -> None:
-        self.target = target
+    target: Any
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Identity) and other.target is self.target

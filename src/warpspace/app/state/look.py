@@ -1,13 +1,14 @@
-"""Display settings of field, machine and traces, and ranges and positions of the axes."""
+"""Display settings of field, machine, traces and page, and ranges and positions of the axes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from warpspace.app.state.leaf import Span, described
+from warpspace.app.state.leaf import Span, described, error_names
 from warpspace.field.grid import slice_ranges
 from warpspace.machine import limits
 from warpspace.machine.definition import Vector
 from warpspace.scene.model import Scene
+from warpspace.scene.notes import KINDS
 from warpspace.units import spell_short
 
 SURFACES = {
@@ -25,6 +26,7 @@ RANGES = {"auto": "auto", "fixed": "fixed", "shared": "shared"}
 RANGE_TOP = Span(*limits.RANGE_TOP, 0.001)
 START_TOP = 50.0
 POINT_MM = Span(-2000.0, 2000.0, 1.0)
+TASKS = {word.lower(): word for word in ("Understand", "Measure", "Improve", "Design", "Machine")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +89,6 @@ class Look:
 
 @dataclass(frozen=True, slots=True)
 class MachineLook:
-    """Display of the machine: its bodies, or transparent ones around the volume."""
-
     shown: bool = described(False, "Machine bodies")
     bent: bool = described(
         True,
@@ -109,8 +109,6 @@ class MachineLook:
 
 @dataclass(frozen=True, slots=True)
 class RotaryLook:
-    """Traced points, and positions of the rotary axes that are held."""
-
     # indices into the trace points of the scene
     off: frozenset[str] = described(
         frozenset[str](),
@@ -145,6 +143,48 @@ class RotaryLook:
     def points_mm(self, scene: Scene) -> tuple[Vector, ...]:
         points = [p for n, p in enumerate(scene.trace_points_mm) if str(n) not in self.off]
         return (*points, *(() if self.own_mm is None else (self.own_mm,)))
+
+
+@dataclass(frozen=True, slots=True)
+class DisplayOptions:
+    traces: bool = described(
+        True, "Rotary traces", hint="Circles and arcs of the table: nominal light, actual dark."
+    )
+    ghost: bool = described(True, "Nominal box", hint="The working volume without errors, dashed.")
+    grid_lines: bool = described(True, "Grid lines", hint="Lines of the grid on the deformed box.")
+    axes: bool = described(True, "Axes", hint="Coordinates of the machine in mm.")
+    dark: bool = described(
+        False, "Dark mode", hint="Light lines on a dark ground; the colours of the map stay."
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class PageLook:
+    task: str = described("understand", "Task", choices=TASKS, linked="")
+    open: frozenset[str] = described(
+        frozenset({"worst", "compensate", "adjust", "concepts", "allocate", "import"}),
+        "Open sections",
+        linked="",
+    )
+    # error with the unfolded row: selected, or changed last; empty for none
+    row: str = described(
+        "", "Unfolded error", choices=lambda state: {"": "none", **error_names(state)}, linked=""
+    )
+    query: str = described("", "Search of errors", linked="")
+    command: str = described("", "Search of commands", linked="")
+    window: str = described("", "Open window", linked="")
+    # "list", "new", or the edited note; empty where the tasks are shown
+    notes: str = described("", "Notes", linked="")
+    figure: str = described("", "Figure", linked="")
+    # draft of a note
+    note_kind: str = described("note", "Kind", choices={k: k for k in KINDS}, linked="")
+    note_place: str = described("point", "About", choices=lambda state: {
+        "point": "clicked or worst point", "whole": "the whole",
+        **{axis: f"body {axis}" for axis in state.scene.machine.axes},
+    }, linked="")  # fmt: skip
+    note_text: str = described("", "Text", kind="lines", hint="What is to be seen here?", linked="")
+    author: str = described("", "Your name", hint="Kept in this browser", linked="")
+    questions: str = described("", "Open questions", kind="lines", hint="One per line", linked="")
 
 
 # --- Ranges and positions of the axes -------------------------------------------------------------

@@ -10,25 +10,17 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from types import FunctionType, ModuleType
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from warpspace.app.state.app_state import (
-    AppState,
-    DisplayOptions,
-    Exclusions,
-    PageLook,
-    PartLook,
-    Specification,
-)
-from warpspace.app.state.leaf import description, lowered, name_of
-from warpspace.app.state.look import Look, MachineLook, RotaryLook
+from warpspace.app.state.app_state import AppState, Comparison
+from warpspace.app.state.leaf import default_of, description, lowered, name_of
+from warpspace.app.state.look import PageLook
 from warpspace.app.state.tree import leaves, stored
 from warpspace.exceptions import OptionError
-from warpspace.machine.errors import ToleranceSet
 
 # --- Differences of two states --------------------------------------------------------------------
 
@@ -83,9 +75,8 @@ def _equal(old: object, new: object) -> bool:
 
 # --- Merging a change into another state ----------------------------------------------------------
 
-_MERGED = (DisplayOptions, Exclusions, Look, MachineLook, PartLook, RotaryLook, Specification,
-           ToleranceSet)  # fmt: skip
-"""Merged field by field; all other objects, such as a scene, as a whole."""
+_MERGED = tuple(type(start) for start in map(default_of, _COMPARED) if is_dataclass(start))
+"""Merged field by field; all other objects, such as a scene, and a comparison as a whole."""
 _MISSING = object()
 
 
@@ -116,7 +107,7 @@ def _merge(old: Any, new: Any, present: Any) -> Any:
             key: _merge(*(side.get(key, _MISSING) for side in (old, new, present))) for key in keys
         }
         return {key: entry for key, entry in entries.items() if entry is not _MISSING}
-    if len(kinds) > 1 or not isinstance(old, _MERGED):
+    if len(kinds) > 1 or not isinstance(old, _MERGED) or isinstance(old, Comparison):
         raise OptionError("somebody else has changed it since; it is left unchanged")
     names = [entry.name for entry in fields(old)]
     values = {
@@ -153,10 +144,7 @@ def _size_bytes(before: AppState, after: AppState) -> int:
     if all(getattr(before, name) is getattr(after, name) for name in _LARGE):
         return 0
     old, new = _sizes(before), _sizes(after)
-    return max(
-        sum(size for key, size in old.items() if key not in new),
-        sum(size for key, size in new.items() if key not in old),
-    )
+    return max(sum(a[key] for key in a.keys() - b.keys()) for a, b in ((old, new), (new, old)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,25 +248,19 @@ class StateStore:
         self.future, self._changed_at = [], at
         document.state, document.is_edited = state, True
 
-    def undo(self) -> str:
-        """Revert the latest change of this tab; return its label.
+    def undo(self, *, redo: bool = False) -> str:
+        """Revert the latest change of this tab, or the latest undo; return its label.
 
         Where another tab has changed the same value since, the step is dropped with an
         `OptionError`.
         """
-        return self._travel(self.past, self.future, is_undo=True)
-
-    def redo(self) -> str:
-        """Apply the change that was undone last; return its label; raises as `undo`."""
-        return self._travel(self.future, self.past, is_undo=False)
-
-    def _travel(self, source: list[UndoStep], target: list[UndoStep], *, is_undo: bool) -> str:
+        source, target = (self.future, self.past) if redo else (self.past, self.future)
         with self._document.lock:
             self._changed_at = float("-inf")
             if not source:
                 return ""
             step = source.pop()
-            sides = (step.after, step.before) if is_undo else (step.before, step.after)
+            sides = (step.before, step.after) if redo else (step.after, step.before)
             try:
                 self._document.state = merged(*sides, self.state)
             except OptionError as error:
@@ -286,6 +268,9 @@ class StateStore:
             target.append(step)
         self._notify(None)
         return step.label
+
+    def redo(self) -> str:
+        return self.undo(redo=True)
 
     def checkpoint(self, page: PageLook) -> Checkpoint:
         return Checkpoint(self.state, tuple(self.past), tuple(self.future), page)

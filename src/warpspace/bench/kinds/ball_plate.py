@@ -11,7 +11,7 @@ from warpspace.analysis.options import option
 from warpspace.bench import placing
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import XYZ, DataColumn, ReadingsFile
-from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan, fit_setup
+from warpspace.bench.plan import BenchPlan, Outcome, build_outcome, build_plan, fit_setup
 from warpspace.exceptions import OptionError
 from warpspace.geometry.surfaces import round_down
 from warpspace.scene.model import Scene
@@ -123,14 +123,13 @@ class BallPlate(BenchTest):
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         residual_um = plate_residuals(plan, readings)
-        first, second = self.plane
         sign = float(plan.marks["gain_sign"][0])
         nominal = np.stack([plan.marks[f"seen_{axis}_mm"] for axis in "xyz"], -1)[
             : len(residual_um)
         ]
         number = plan.marks["position"][: len(residual_um)]
-        columns = ["XYZ".index(name) for name in (first, second)]
-        rows: list[dict[str, object]] = []
+        columns = ["XYZ".index(name) for name in self.plane]
+        rows: list[dict[str, float]] = []
         for index in np.unique(number):
             chosen = number == index
             deviation, position = residual_um[chosen], nominal[chosen][:, columns]
@@ -139,8 +138,8 @@ class BallPlate(BenchTest):
                 {
                     "position": int(index) + 1,
                     "rms_um": float(np.sqrt(np.mean(np.sum(deviation**2, axis=-1)))),
-                    f"scale_{first}_um_per_m": scale_1,
-                    f"scale_{second}_um_per_m": scale_2,
+                    f"scale_{self.plane[0]}_um_per_m": scale_1,
+                    f"scale_{self.plane[1]}_um_per_m": scale_2,
                     "squareness_urad": sign * angle,
                     "flatness_um": float(np.ptp(deviation[:, 3 - sum(columns)])),
                     "length_error_um": _length_error(nominal[chosen], deviation),
@@ -148,33 +147,25 @@ class BallPlate(BenchTest):
             )
 
         def worst(name: str) -> float:
-            return max((float(str(row[name])) for row in rows), key=abs)
+            return max((row[name] for row in rows), key=abs)
 
         def mean(name: str) -> float:
-            return float(np.mean([float(str(row[name])) for row in rows]))
+            return float(np.mean([row[name] for row in rows]))
 
         quantities = (
-            BenchQuantity("length_error_um", "largest error of a distance",
-                     worst("length_error_um"), "µm"),
-            BenchQuantity(
-                "squareness_urad",
-                f"squareness {plan.squareness_key}, mean",
-                mean("squareness_urad"),
-                "µrad",
-            ),
-            *(
-                BenchQuantity(f"scale_{axis}_um_per_m", f"scale of {axis}, mean",
-                         mean(f"scale_{axis}_um_per_m"), "µm/m")
-                for axis in (first, second)
-            ),
-            BenchQuantity("flatness_um", "largest height of the plate", worst("flatness_um"), "µm"),
-            BenchQuantity("rms_um", "RMS of a position, mean", mean("rms_um"), "µm"),
-        )  # fmt: skip
-        return Outcome(quantities, {"positions": rows, "squareness_key": plan.squareness_key})
+            ("length_error_um", "largest error of a distance", worst),
+            ("squareness_urad", f"squareness {plan.squareness_key}, mean", mean),
+            *((f"scale_{axis}_um_per_m", f"scale of {axis}, mean", mean) for axis in self.plane),
+            ("flatness_um", "largest height of the plate", worst),
+            ("rms_um", "RMS of a position, mean", mean),
+        )
+        return build_outcome(
+            ((name, text, total(name)) for name, text, total in quantities),
+            {"positions": rows, "squareness_key": plan.squareness_key},
+        )
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
-        first, second = self.plane
-        columns = ["XYZ".index(name) for name in (first, second)]
+        columns = ["XYZ".index(name) for name in self.plane]
         largest = max(float(np.abs(plate_residuals(run.plan, run.readings)).max()) for run in runs)
         marks = runs[0].plan.marks
         count = runs[0].plan.readings // 3
@@ -193,13 +184,10 @@ class BallPlate(BenchTest):
                 moved = nominal[chosen] + factor * residual_um / UM_PER_MM
                 style = "dots" if run.is_measured else "line"
                 curves += _net(run.label("actual"), moved, ball_row, ball_column, 0, style)
-            charts.append(
-                Lines(
-                    "plane", f"Position {int(index) + 1}", f"{first.lower()} [mm]",
-                    f"{second.lower()} [mm]", tuple(curves), (),
-                    f"Deviations {factor:,.0f} × exaggerated.",
-                )
-            )  # fmt: skip
+            x_label, y_label = (f"{axis.lower()} [mm]" for axis in self.plane)
+            labels = f"Position {int(index) + 1}", x_label, y_label
+            note = f"Deviations {factor:,.0f} × exaggerated."
+            charts.append(Lines("plane", *labels, tuple(curves), note=note))
         return tuple(charts)
 
 

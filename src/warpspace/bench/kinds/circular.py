@@ -12,7 +12,7 @@ from warpspace.analysis.options import Axis, option
 from warpspace.bench import placing
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ANGLE, DIRECTION, DataColumn, ReadingsFile
-from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan
+from warpspace.bench.plan import BenchPlan, Outcome, build_outcome, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import Workspace
 from warpspace.machine.axes import is_linear
@@ -21,6 +21,7 @@ from warpspace.units import UM_PER_MM_URAD, Array
 
 DEFAULT_POINTS, MIN_POINTS, MAX_POINTS = 360, 8, 100_000
 TURN = 360.0
+BAR_MM = 100.0  # length of a bar at a rotary axis: motion across it is of second order
 LEEWAY_DEG = 5.0  # difference of the ends of an arc that is not reported
 ALIKE_UM = 1e-6  # runs that differ by less are drawn as one
 SENSES = {1.0: "counter-clockwise", -1.0: "clockwise"}
@@ -52,6 +53,14 @@ class CircleFit:
     # amplitudes of the sin 2φ and cos 2φ parts; None and 0 on arcs that are too short
     shear_um: float | None
     scale_difference_um: float
+
+    def details(self, plan: BenchPlan) -> dict[str, object]:
+        """Return the further numbers of an outcome."""
+        return {
+            "centre_um": list(self.centre_um),
+            "angle_deg": plan.marks["angle_deg"].tolist(),
+            "radial_um": self.radial_um.tolist(),
+        }
 
 
 def covered_deg(angle_deg: Array) -> float:
@@ -181,8 +190,7 @@ class Circular(BenchTest):
 
     def _lay(self, scene: Scene, angle_deg: Array, sense: Array) -> BenchPlan:
         if self.rotary:
-            how = self.rotary, self.radius_mm, self.bar, self.axis_positions(scene)
-            return placing.plan_followed_circle(scene, self.model(scene), *how, angle_deg, sense)
+            return self._lay_about_axis(scene, angle_deg, sense)
         first, second = placing.plane_axes(scene.machine, self.plane)
         if not 0.0 < self.radius_mm < np.inf:
             raise OptionError(f"radius: {self.radius_mm:g} mm; expected above 0")
@@ -225,51 +233,66 @@ class Circular(BenchTest):
             path=(np.arange(count),), squareness_key=plane.key,
         )  # fmt: skip
 
+    def _lay_about_axis(self, scene: Scene, angle_deg: Array, sense: Array) -> BenchPlan:
+        axis = placing.find_axis(scene.machine, self.rotary, "rotary")
+        model, stand, count = self.model(scene), self.axis_positions(scene), len(angle_deg)
+        ball = placing.default_ball(scene, model, axis, stand, self.radius_mm)
+        coordinates = placing.follow(model, {**stand, axis: angle_deg}, ball)
+        placing.check_travel(scene, coordinates, f"the path about {axis}")
+        point = placing.tool_points(model, coordinates, count)
+        line = placing.axis_line(model, coordinates, axis)
+        axial = np.broadcast_to(line.direction, point.shape)
+        arm = point - line.origin_mm
+        arm = arm - np.sum(arm * axial, axis=-1, keepdims=True) * axial
+        length = np.linalg.norm(arm, axis=-1, keepdims=True)
+        if length.min() < 1e-3:
+            raise OptionError(f"the ball lies on {axis}; expected a distance from it")
+        radial = arm / length
+        tangential: Array = np.asarray(np.cross(axial, radial), dtype=np.float64)
+        bars = {"radial": radial, "tangential": tangential, "axial": axial}
+        theta = np.deg2rad(angle_deg)
+        return build_plan(
+            coordinates,
+            point,
+            bars[self.bar],
+            place=f"{axis} turns · ball {self.radius_mm:g} mm from it · {self.bar} bar",
+            marks={
+                "angle_deg": angle_deg, "sense": sense,
+                "along": np.cos(theta), "up": np.sin(theta), "as_read": np.ones(count),
+            },
+            length_mm=BAR_MM,
+            travel=placing.travel_directions(coordinates, sense),
+            setup={
+                **placing.ball_setup(model, coordinates, bars[self.bar]), "bar_um": np.ones(count),
+            },
+        )  # fmt: skip
+
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         fit = fit_circle_readings(plan, readings)
-        letter = "G" if fit.mean_radial_um is None else "G(b)"
-        deviation = fit.deviation_um
-        quantities = [
-            BenchQuantity("circular_deviation_um", f"circular deviation {letter}", deviation, "µm")
-        ]
-        for sense, value in fit.by_sense.items():
-            word = SENSES[sense].replace("-", "_")
-            quantities.append(
-                BenchQuantity(f"circular_deviation_{word}_um", f"G, {SENSES[sense]}", value, "µm")
-            )
-        largest, smallest = float(readings.max()), float(readings.min())
         bar = self.bar if self.rotary else "radial"
-        quantities += [
-            BenchQuantity("radial_deviation_max_um", f"{bar} deviation Fmax", largest, "µm"),
-            BenchQuantity("radial_deviation_min_um", f"{bar} deviation Fmin", smallest, "µm"),
+        letter = "G" if fit.mean_radial_um is None else "G(b)"
+        rows = [("circular_deviation_um", f"circular deviation {letter}", fit.deviation_um)]
+        for sense, value in fit.by_sense.items():
+            key = f"circular_deviation_{SENSES[sense].replace('-', '_')}_um"
+            rows.append((key, f"G, {SENSES[sense]}", value))
+        rows += [
+            ("radial_deviation_max_um", f"{bar} deviation Fmax", float(readings.max())),
+            ("radial_deviation_min_um", f"{bar} deviation Fmin", float(readings.min())),
         ]
         if fit.mean_radial_um is not None and fit.hysteresis_um is not None:
             label = f"mean bi-directional {bar} deviation D"
-            quantities += [
-                BenchQuantity("mean_radial_deviation_um", label, fit.mean_radial_um, "µm"),
-                BenchQuantity("hysteresis_um", "hysteresis H", fit.hysteresis_um, "µm"),
-            ]
-        radius = fit.radius_um
-        quantities.append(BenchQuantity("radius_um", "mean radius − nominal", radius, "µm"))
+            rows.append(("mean_radial_deviation_um", label, fit.mean_radial_um))
+            rows.append(("hysteresis_um", "hysteresis H", fit.hysteresis_um))
+        rows.append(("radius_um", "mean radius − nominal", fit.radius_um))
         details: dict[str, object] = {}
         if fit.shear_um is not None and not self.rotary:
-            first, second = self.plane
-            lever = plan.marks["gain_sign"][0] * self.radius_mm * UM_PER_MM_URAD
-            squareness = float(2.0 * fit.shear_um / lever)
-            quantities += [
-                BenchQuantity(
-                    "squareness_urad", f"squareness {plan.squareness_key}", squareness, "µrad"
-                ),
-                BenchQuantity(
-                    "scale_difference_um", f"{first} longer than {second}, of the radius",
-                    fit.scale_difference_um, "µm",
-                ),
-            ]  # fmt: skip
-            details["squareness_key"] = plan.squareness_key
-        details["centre_um"] = list(fit.centre_um)
-        details["angle_deg"] = plan.marks["angle_deg"].tolist()
-        details["radial_um"] = fit.radial_um.tolist()
-        return Outcome(tuple(quantities), details)
+            key, lever = plan.squareness_key, self.radius_mm * UM_PER_MM_URAD
+            squareness = 2.0 * fit.shear_um / (float(plan.marks["gain_sign"][0]) * lever)
+            label = f"{self.plane[0]} longer than {self.plane[1]}, of the radius"
+            rows.append(("squareness_urad", f"squareness {key}", squareness))
+            rows.append(("scale_difference_um", label, fit.scale_difference_um))
+            details["squareness_key"] = key
+        return build_outcome(rows, details | fit.details(plan))
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
@@ -294,12 +317,8 @@ class Circular(BenchTest):
         title = f"{self.bar} deviation along the circle about {self.rotary}"
         if not self.rotary:
             title = f"{self.plane} plane, 0° at +{self.plane[0]}, 90° at +{self.plane[1]}"
-        return (
-            Lines(
-                "polar", title, "angle [°]", "deviation [µm]", tuple(curves), (),
-                "As read." if self.rotary else "About the least-squares centre.",
-            ),
-        )  # fmt: skip
+        note = "As read." if self.rotary else "About the least-squares centre."
+        return (Lines("polar", title, "angle [°]", "deviation [µm]", tuple(curves), note=note),)
 
 
 def check_circle(

@@ -11,13 +11,12 @@ from warpspace.bench import placing
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ANGLE, DataColumn, ReadingsFile
 from warpspace.bench.kinds.circular import fit_circle_readings
-from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan
+from warpspace.bench.plan import BenchPlan, Outcome, build_outcome, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, tool_axis
 from warpspace.kinematics.model import Model
 from warpspace.kinematics.relative_motion import relative_point
-from warpspace.machine.definition import Machine
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -27,15 +26,15 @@ CLOSE = 1e-9  # residual of the direction: a thousandth of a microradian
 PENALTY = 0.02  # per radian from the start, to choose among several solutions
 
 
-def orient(
-    machine: Machine, model: Model, stand: Mapping[str, Array], tool_axes: Array
-) -> dict[str, Array]:
+def orient(model: Model, stand: Mapping[str, Array], tool_axes: Array) -> dict[str, Array]:
+    """Find the positions of two rotary axes that turn the tool along directions, [n, 3]."""
+    machine = model.machine
     names = [axis.name for axis in machine.axes.values() if not axis.is_linear]
     if len(names) < 2:
         raise OptionError(
             f"the machine {machine.chain} has {len(names)} rotary"
-            f" {'axis' if len(names) == 1 else 'axes'}; expected two to turn the tool along"
-            f" the cone"
+            f" {'axis' if len(names) == 1 else 'axes'}; expected two to turn the tool along the"
+            " cone"
         )
     names = names[:2]
     limits = np.array([machine.axes[name].travel for name in names])
@@ -45,15 +44,10 @@ def orient(
         pose = np.asarray(branch_pose(model, "workpiece", at))[..., :3, :3]
         return transforms.rotate(np.swapaxes(pose, -1, -2), tool_axis(model, at))
 
-    seeds = np.stack(
-        np.meshgrid(
-            *(np.linspace(float(low), float(high), SEEDS) for low, high in limits), indexing="ij"
-        ),
-        -1,
-    ).reshape(-1, 2)
-    directions = direction(seeds)
+    ranges = (np.linspace(float(low), float(high), SEEDS) for low, high in limits)
+    seeds = np.stack(np.meshgrid(*ranges, indexing="ij"), -1).reshape(-1, 2)
     start = np.array([float(stand[name]) for name in names])
-    cost = np.linalg.norm(directions - tool_axes[0], axis=-1)
+    cost = np.linalg.norm(direction(seeds) - tool_axes[0], axis=-1)
     cost = cost + PENALTY * np.abs(np.deg2rad(seeds - start)).sum(axis=-1)
     angles = seeds[int(np.argmin(cost))]
     solution = np.empty((len(tool_axes), 2))
@@ -134,24 +128,20 @@ class ConeFrustum(BenchTest):
                 " expected 0 to 90 and -90 to 90 degrees"
             )
         model, stand = self.model(scene), self.axis_positions(scene)
-        middle = (
-            np.asarray(relative_point(model, stand))
-            if self.centre is None
-            else np.asarray(self.centre, dtype=float)
-        )
+        middle = relative_point(model, stand)
+        if self.centre is not None:
+            middle = np.asarray(self.centre, dtype=float)
         theta = np.deg2rad(angle_deg)
         leaning = transforms.axis_rotation(1, np.deg2rad(self.tilt_deg))
         flat = np.stack([np.cos(theta), np.sin(theta), np.zeros_like(theta)], -1)
         outward = transforms.rotate(leaning, flat)
         half = np.deg2rad(self.half_apex_deg)
         flank = np.cos(half) * leaning[:, 2] - np.sin(half) * outward
-        coordinates = orient(scene.machine, model, stand, flank)
+        coordinates = orient(model, stand, flank)
         coordinates = placing.follow(model, coordinates, middle + self.radius_mm * outward)
         placing.check_travel(scene, coordinates, "the cone")
-        pose = np.asarray(branch_pose(model, "workpiece", coordinates))
-        direction = transforms.rotate(
-            np.broadcast_to(pose, (len(theta), 4, 4))[..., :3, :3], outward
-        )
+        pose = branch_pose(model, "workpiece", coordinates)
+        direction = transforms.rotate(pose[..., :3, :3], outward)
         centre_text = ", ".join(f"{value:.4g}" for value in middle)
         return build_plan(
             coordinates,
@@ -173,17 +163,11 @@ class ConeFrustum(BenchTest):
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         fit = fit_circle_readings(plan, readings)
-        return Outcome(
-            (
-                BenchQuantity("circular_deviation_um", "circularity", fit.deviation_um, "µm"),
-                BenchQuantity("radius_um", "mean radius − nominal", fit.radius_um, "µm"),
-            ),
-            {
-                "centre_um": list(fit.centre_um),
-                "angle_deg": plan.marks["angle_deg"].tolist(),
-                "radial_um": fit.radial_um.tolist(),
-            },
-        )
+        rows = [
+            ("circular_deviation_um", "circularity", fit.deviation_um),
+            ("radius_um", "mean radius − nominal", fit.radius_um),
+        ]
+        return build_outcome(rows, fit.details(plan))
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
@@ -191,9 +175,5 @@ class ConeFrustum(BenchTest):
             fit = fit_circle_readings(run.plan, run.readings)
             x = run.plan.marks["angle_deg"]
             curves.append(run.curve("radial deviation", x, fit.radial_um, once_round=True))
-        return (
-            Lines(
-                "polar", "Circle on the cone", "angle [°]", "radial deviation [µm]", tuple(curves),
-                (), "About the least-squares centre.",
-            ),
-        )  # fmt: skip
+        labels = "Circle on the cone", "angle [°]", "radial deviation [µm]"
+        return (Lines("polar", *labels, tuple(curves), note="About the least-squares centre."),)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ALONG, DataColumn, ReadingsFile
 from warpspace.bench.kinds.positioning import target_statistics
 from warpspace.bench.placing import PLANES, find_plane, following_axes, tool_offset, tool_points
-from warpspace.bench.plan import BenchPlan, BenchQuantity, IndexArray, Outcome, build_plan
+from warpspace.bench.plan import BenchPlan, IndexArray, Outcome, build_outcome, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 from warpspace.units import Array
@@ -233,7 +233,7 @@ class Diagonals(BenchTest):
         names = self.names
         number, travel_sign = plan.marks["diagonal"], plan.marks["travel_sign"]
         position = plan.marks["position_mm"]
-        rows: list[dict[str, object]] = []
+        rows: list[dict[str, Any]] = []
         lengths = np.full(len(names), np.nan)
         for index, name in enumerate(names):
             chosen = number == index
@@ -241,7 +241,7 @@ class Diagonals(BenchTest):
                 continue
             means = means_along(position[chosen], travel_sign[chosen], readings[chosen])
             lengths[index] = means["mean"][-1] - means["mean"][0]
-            row: dict[str, object] = {
+            row: dict[str, Any] = {
                 "diagonal": name,
                 "length_mm": float(np.ptp(position[chosen])),
                 "length_deviation_um": float(lengths[index]),
@@ -256,60 +256,41 @@ class Diagonals(BenchTest):
                 axis = plan.marks["axis"][chosen]
                 row["by_axis_um"] = {x: float(steps[axis == i].sum()) for i, x in enumerate("XYZ")}
             rows.append(row)
+        complete = lengths[np.isfinite(lengths)]
         quantities = [
-            BenchQuantity("E_um", "largest systematic deviation E", _largest(rows, "E_um"), "µm"),
-            BenchQuantity(
-                "length_difference_um", "longest less shortest deviation of length",
-                float(np.ptp(lengths[np.isfinite(lengths)])), "µm",
-            ),
-        ]  # fmt: skip
-        if any("B_um" in row for row in rows):
-            quantities.append(
-                BenchQuantity("B_um", "largest reversal B", _largest(rows, "B_um"), "µm")
-            )
-        squareness = squareness_of_diagonals(plan, names, lengths)
-        name_format = "equivalent squareness {}"
-        quantities += [
-            BenchQuantity(f"squareness_{key}_urad", name_format.format(key), value, "µrad")
-            for key, value in squareness.items()
+            ("E_um", "largest systematic deviation E", max(row["E_um"] for row in rows)),
+            ("length_difference_um", "longest less shortest deviation of length", np.ptp(complete)),
         ]
-        return Outcome(tuple(quantities), {"diagonals": rows})
+        reversals = [row["B_um"] for row in rows if "B_um" in row]
+        if reversals:
+            quantities.append(("B_um", "largest reversal B", max(reversals)))
+        for key, value in squareness_of_diagonals(plan, names, lengths).items():
+            quantities.append((f"squareness_{key}_urad", f"equivalent squareness {key}", value))
+        return build_outcome(quantities, {"diagonals": rows})
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
         for run in runs:
             marks = run.plan.marks
             for index, name in enumerate(self.names):
-                for travel_sign, suffix in ((1.0, ""), (-1.0, " back")):
-                    chosen = (marks["diagonal"] == index) & (marks["travel_sign"] == travel_sign)
-                    if not chosen.any() or (
-                        travel_sign < 0.0 and not run.is_measured and _alike(run, index)
-                    ):
-                        continue
-                    style = (
-                        "dots" if run.is_measured else ("line" if travel_sign > 0.0 else "dashed")
-                    )
-                    x, y = marks["position_mm"][chosen], run.readings[chosen]
-                    curves.append(Curve(run.label(name + suffix), x, y, index, style))
-        return (
-            Lines(
-                "lines", f"Along the {self.kind} diagonals", "distance from the start [mm]",
-                "deviation [µm]", tuple(curves), (),
-                "P: the axis runs upwards, N: downwards, in the order x, y, z.",
-            ),
-        )  # fmt: skip
+                forth, back = (
+                    (marks["diagonal"] == index) & (marks["travel_sign"] == sign)
+                    for sign in (1.0, -1.0)
+                )
+                if not run.is_measured and _alike(run.readings[forth], run.readings[back]):
+                    back = back & False
+                for text, chosen in ((name, forth), (f"{name} back", back)):
+                    if chosen.any():
+                        x, y = marks["position_mm"][chosen], run.readings[chosen]
+                        style = "line" if chosen is forth else "dashed"
+                        style = "dots" if run.is_measured else style
+                        curves.append(Curve(run.label(text), x, y, index, style))
+        title, note = f"Along the {self.kind} diagonals", "P: the axis runs upwards, N: downwards"
+        labels = title, "distance from the start [mm]", "deviation [µm]"
+        return (Lines("lines", *labels, tuple(curves), note=f"{note}, in the order x, y, z."),)
 
 
-def _alike(run: BenchRun, index: int) -> bool:
-    marks = run.plan.marks
-    forward, backward = (
-        run.readings[(marks["diagonal"] == index) & (marks["travel_sign"] == travel_sign)]
-        for travel_sign in (1.0, -1.0)
-    )
+def _alike(forward: Array, backward: Array) -> bool:
     return len(forward) == len(backward) and bool(
         np.abs(forward - backward[::-1]).max(initial=0.0) < 1e-9
     )
-
-
-def _largest(rows: Sequence[dict[str, object]], key: str) -> float:
-    return max(float(str(row[key])) for row in rows if key in row)

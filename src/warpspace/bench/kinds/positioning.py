@@ -10,7 +10,7 @@ from warpspace.analysis.options import Axis, option
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import DataColumn, ReadingsFile
 from warpspace.bench.placing import axis_line, motion_direction, tool_points
-from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan
+from warpspace.bench.plan import BenchPlan, Outcome, build_outcome, build_plan
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene
@@ -35,20 +35,16 @@ class TargetStatistics:
 def target_statistics(target: Array, travel_sign: Array, readings: Array) -> TargetStatistics:
     """Compute mean and standard deviation of the readings per target and direction."""
     targets, index = np.unique(np.round(target, 6), return_inverse=True)
-    mean = np.full((2, len(targets)), np.nan)
-    deviation = np.full((2, len(targets)), np.nan)
+    mean, deviation = np.empty((2, 2, len(targets)))
     for row, sign in enumerate((FORWARD, BACKWARD)):
         chosen = travel_sign == sign
         at, values = index.reshape(-1)[chosen], readings[chosen]
         count = np.bincount(at, minlength=len(targets))
         is_measured = count > 0
-        mean[row, is_measured] = (
-            np.bincount(at, values, len(targets))[is_measured] / count[is_measured]
-        )
+        mean[row] = np.bincount(at, values, len(targets)) / np.where(is_measured, count, np.nan)
         squares = np.bincount(at, (values - mean[row, at]) ** 2, len(targets))
-        deviation[row, is_measured] = np.sqrt(
-            squares[is_measured] / np.maximum(count[is_measured] - 1, 1)
-        )
+        free = np.where(is_measured, np.maximum(count - 1, 1), np.nan)
+        deviation[row] = np.sqrt(squares / free)
     return TargetStatistics(targets, mean, deviation)
 
 
@@ -157,12 +153,8 @@ class Positioning(BenchTest):
         statistics = target_statistics(plan.marks["target"], plan.marks["travel_sign"], readings)
         unit = "µm" if "zero_um" in plan.setup else "µrad"
         suffix = "um" if unit == "µm" else "urad"
-        quantities = [
-            BenchQuantity(f"{key}_{suffix}", name, value, unit)
-            for key, name, value in _numbers(statistics)
-            if np.isfinite(value)
-        ]
-        return Outcome(tuple(quantities), {"targets": _target_rows(statistics, unit)})
+        rows = [(f"{key}_{suffix}", name, size) for key, name, size in _numbers(statistics)]
+        return build_outcome(rows, {"targets": _target_rows(statistics, unit)})
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
@@ -193,12 +185,9 @@ class Positioning(BenchTest):
                 if run.is_measured:
                     bands.append(Band(f"{word} ±2s", x, mean - spread, mean + spread, row))
         axis = plan.place.partition(" ")[0]
-        return (
-            Lines(
-                "lines", f"Positioning of {axis}", f"{axis} [{'mm' if linear else '°'}]",
-                f"deviation [{unit}]", tuple(curves), tuple(bands), note,
-            ),
-        )  # fmt: skip
+        x_label, y_label = f"{axis} [{'mm' if linear else '°'}]", f"deviation [{unit}]"
+        labels = f"Positioning of {axis}", x_label, y_label
+        return (Lines("lines", *labels, tuple(curves), tuple(bands), note),)
 
 
 def _numbers(statistics: TargetStatistics) -> list[tuple[str, str, float]]:

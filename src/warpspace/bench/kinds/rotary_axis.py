@@ -12,7 +12,8 @@ from warpspace.bench import placing
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ANGLE, XYZ, DataColumn, ReadingsFile
 from warpspace.bench.kinds.circular import is_full
-from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan, fit_setup
+from warpspace.bench.plan import BenchPlan, Outcome, build_outcome, build_plan, fit_setup
+from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.relative_motion import relative_point
@@ -20,25 +21,9 @@ from warpspace.scene.model import Scene
 from warpspace.units import Array
 
 LEVER_MM = 1000.0  # between the places where the axis is sensed: 1 µm there is 1 µrad
+TURNS = {"x": "A", "y": "B", "z": "C"}
 CHANNELS = ("x_um", "y_um", "z_um", "a_urad", "b_urad", "c_urad")
 """Across, across, along the axis; about the same three: E_XC, E_YC, E_ZC, E_AC, E_BC, E_CC of C."""
-
-
-@dataclass(frozen=True)
-class Motions:
-    """Error motions of an axis over its position."""
-
-    angle_deg: Array  # [n]; ascending
-    # [n], µm and µrad; towards a point that turns with the axis (rotating sensitive direction),
-    # about the least-squares centre
-    radial: Array
-    tilt: Array
-    # [n], µm and µrad; about their means; the angular one NaN where it was not measured
-    axial: Array
-    angular: Array
-    # location in µm along the two directions across the axis, orientation in µrad about them: the
-    # axis average line
-    average_line: Sequence[float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +52,7 @@ class RotaryAxis(BenchTest):
     points: int = option(72, "Positions along the turn", low=8, high=3_600)
 
     def plan(self, scene: Scene) -> BenchPlan:
-        axis = placing.rotary_axis(scene.machine, self.axis)
+        axis = placing.find_axis(scene.machine, self.axis, "rotary")
         low, high = scene.machine.axes[axis].travel
         full = high - low >= 360.0
         end = low + 360.0 if full else high
@@ -79,7 +64,7 @@ class RotaryAxis(BenchTest):
         return self._lay(scene, table["angle_deg"]), readings
 
     def _lay(self, scene: Scene, angle_deg: Array) -> BenchPlan:
-        axis, model = placing.rotary_axis(scene.machine, self.axis), self.model(scene)
+        axis, model = placing.find_axis(scene.machine, self.axis, "rotary"), self.model(scene)
         stand = self.axis_positions(scene)
         line = placing.axis_line(model, stand, axis)
         height = self.height_mm
@@ -127,53 +112,49 @@ class RotaryAxis(BenchTest):
         )  # fmt: skip
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
-        error_motions = motions(plan, readings)
+        angle_deg, motions, average_line = error_motions(plan, readings)
         axis = plan.place.partition(" ")[0]
-        quantities = [
-            BenchQuantity(
-                "radial_um", "radial error motion", float(np.ptp(error_motions.radial)), "µm"
-            ),
-            BenchQuantity(
-                "axial_um", "axial error motion", float(np.ptp(error_motions.axial)), "µm"
-            ),
-            BenchQuantity(
-                "tilt_urad", "tilt error motion", float(np.ptp(error_motions.tilt)), "µrad"
-            ),
-            BenchQuantity(
-                "angular_urad", "angular positioning", float(np.ptp(error_motions.angular)), "µrad"
-            ),
+        rows: list[tuple[str, str, float]] = [
+            ("radial_um", "radial error motion", np.ptp(motions["radial"])),
+            ("axial_um", "axial error motion", np.ptp(motions["axial"])),
+            ("tilt_urad", "tilt error motion", np.ptp(motions["tilt"])),
+            ("angular_urad", "angular positioning", np.ptp(motions["angular"])),
         ]
         across = {"A": "yz", "B": "zx", "C": "xy"}[axis[0]]
-        parts = [(letter.upper(), f"location in {letter}", "µm") for letter in across]
-        parts += [("abc"["xyz".index(a)].upper(), f"orientation about {a}", "µrad") for a in across]
-        for (letter, word, unit), value in zip(parts, error_motions.average_line, strict=True):
-            key, suffix = f"E{letter}0{axis}", "um" if unit == "µm" else "urad"
-            quantities.append(BenchQuantity(f"{key}_{suffix}", f"{word} ({key})", value, unit))
-        details: dict[str, object] = {"angle_deg": error_motions.angle_deg.tolist()}
-        for name in ("radial", "axial", "tilt", "angular"):
-            details[f"{name}_motion"] = getattr(error_motions, name).tolist()
-        return Outcome(tuple(quantities), details)
+        parts = [(f"E{x.upper()}0{axis}", "um", f"location in {x}") for x in across]
+        parts += [(f"E{TURNS[x]}0{axis}", "urad", f"orientation about {x}") for x in across]
+        for (key, unit, text), value in zip(parts, average_line, strict=True):
+            rows.append((f"{key}_{unit}", f"{text} ({key})", value))
+        details = {f"{name}_motion": values.tolist() for name, values in motions.items()}
+        return build_outcome(rows, {"angle_deg": angle_deg.tolist(), **details})
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         axis = runs[0].plan.place.partition(" ")[0]
         charts: list[Lines] = []
-        units = {"radial": "µm", "tilt": "µrad", "axial": "µm", "angular": "µrad"}
-        for name, unit in units.items():
+        for name, unit in (
+            ("radial", "µm"),
+            ("tilt", "µrad"),
+            ("axial", "µm"),
+            ("angular", "µrad"),
+        ):
             curves: list[Curve] = []
             for run in runs:
-                error_motions = motions(run.plan, run.readings)
-                x, y = error_motions.angle_deg, getattr(error_motions, name)
-                name_ = f"{name} error motion"
-                curves.append(run.curve(name_, x, y, once_round=is_full(x)))
-            title = f"{axis}: {name}"
-            charts.append(
-                Lines("polar", title, f"{axis} [°]", f"deviation [{unit}]", tuple(curves))
-            )
+                x, motions, _ = error_motions(run.plan, run.readings)
+                full = is_full(x)
+                curves.append(run.curve(f"{name} error motion", x, motions[name], once_round=full))
+            labels = f"{axis}: {name}", f"{axis} [°]", f"deviation [{unit}]"
+            charts.append(Lines("polar", *labels, tuple(curves)))
         return tuple(charts)
 
 
-def motions(plan: BenchPlan, readings: Array) -> Motions:
-    """Compute the error motions from the readings of six channels, [6 n]."""
+def error_motions(plan: BenchPlan, readings: Array) -> tuple[Array, dict[str, Array], list[float]]:
+    """Compute error motions, [n], µm and µrad, from the readings of six channels, [6 n].
+
+    Positions, [n], ascend. Radial and tilt are taken towards a point that turns with the axis
+    (rotating sensitive direction), about the least-squares centre; axial and angular about their
+    means, the angular one NaN where it was not measured. Last, the axis average line: location in
+    µm along the two directions across the axis, orientation in µrad about them.
+    """
     channels = readings.reshape(6, -1)
     angle_deg = plan.marks["angle_deg"][: channels.shape[1]]
     order = np.argsort(angle_deg, kind="stable")
@@ -191,20 +172,19 @@ def motions(plan: BenchPlan, readings: Array) -> Motions:
 
     # The axis leans towards +across by a turn about upright, towards +upright by one about −across.
     leaning = b * cosine - a * sine
-    return Motions(
-        angle_deg,
-        about_centre(x * cosine + y * sine),
-        about_centre(leaning),
-        z - z.mean(),
-        c - c.mean(),
-        # means over the turn without the once-per-turn part of an eccentric artefact
-        [float(once_round(values)[0]) for values in (x, y, a, b)],
-    )
+    motions = {
+        "radial": about_centre(x * cosine + y * sine),
+        "axial": z - z.mean(),
+        "tilt": about_centre(leaning),
+        "angular": c - c.mean(),
+    }
+    # means over the turn without the once-per-turn part of an eccentric artefact
+    return angle_deg, motions, [float(once_round(values)[0]) for values in (x, y, a, b)]
 
 
 def _eccentricity(theta: Array) -> dict[str, Array]:
-    zero, cosine, sine = np.zeros_like(theta), np.cos(theta), np.sin(theta)
-    ones = np.ones_like(theta)
+    zero, ones = np.zeros_like(theta), np.ones_like(theta)
+    cosine, sine = np.cos(theta), np.sin(theta)
     return {
         "eccentric_x_um": np.concatenate([cosine, sine, zero, zero, zero, zero]),
         "eccentric_y_um": np.concatenate([-sine, cosine, zero, zero, zero, zero]),
@@ -213,9 +193,6 @@ def _eccentricity(theta: Array) -> dict[str, Array]:
         "height_um": np.concatenate([zero, zero, ones, zero, zero, zero]),
         "zero_urad": np.concatenate([zero, zero, zero, zero, zero, ones]),
     }
-
-
-AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,35 +227,60 @@ class RTest(BenchTest):
 
     def plan(self, scene: Scene) -> BenchPlan:
         axis, ball = self._set_up(scene)
-        conditions = scene, self.model(scene), axis, ball, self.axis_positions(scene)
-        return self._lay(
-            scene, placing.reachable_positions(*conditions, self.start, self.end, self.points)
-        )
+        low, high = scene.machine.axes[axis].travel
+        stand = self.axis_positions(scene)
+        present = float(np.clip(stand[axis], low, high))
+        if high - low > 360.0:
+            low = max(low, min(present - 180.0, high - 360.0))
+            high = low + 360.0
+        if self.start is not None or self.end is not None:
+            low = low if self.start is None else self.start
+            high = high if self.end is None else self.end
+            if not low < high:
+                raise OptionError(f"{axis} from {low:g} to {high:g}°; expected start below end")
+            return self._lay(scene, np.linspace(low, high, self.points))
+        fine = np.unique(np.append(np.linspace(low, high, 721), present))
+        path = placing.follow(self.model(scene), {**stand, axis: fine}, ball)
+        inside = placing.within_travel(scene.machine, path)
+        at = int(np.searchsorted(fine, present))
+        if not inside[at]:
+            ball_text = ", ".join(f"{value:.4g}" for value in ball)
+            raise OptionError(
+                f"the tool cannot reach the ball at ({ball_text}) mm of the workpiece with"
+                f" {axis} = {present:g}; give {{ball}} x,y,z within the travel"
+            )
+        outside = np.flatnonzero(~inside)
+        first = float(fine[outside[outside < at].max(initial=-1) + 1])
+        last = float(fine[outside[outside > at].min(initial=len(fine)) - 1])
+        if last - first < 1.0:
+            raise OptionError(
+                f"{axis} could turn by {last - first:.2g}° only before a linear axis reaches its"
+                " end; give {ball} x,y,z nearer to the axis"
+            )
+        return self._lay(scene, np.linspace(first, last, self.points))
 
     def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         table.check_angles(4, "path")
-        readings = np.concatenate([table[f"{name}_um"] for name in AXES])
+        readings = np.concatenate([table[f"{name}_um"] for name in "xyz"])
         return self._lay(scene, table["angle_deg"]), readings
 
     def _set_up(self, scene: Scene) -> tuple[str, Array]:
-        axis = placing.rotary_axis(scene.machine, self.axis)
+        axis = placing.find_axis(scene.machine, self.axis, "rotary")
         if self.ball is not None:
             return axis, np.asarray(self.ball, dtype=float)
-        return axis, placing.default_ball(
-            scene, self.model(scene), axis, self.axis_positions(scene), None
-        )
+        stand = self.axis_positions(scene)
+        return axis, placing.default_ball(scene, self.model(scene), axis, stand, None)
 
     def _lay(self, scene: Scene, angle_deg: Array) -> BenchPlan:
         axis, ball = self._set_up(scene)
-        model = self.model(scene)
-        coordinates = placing.follow_ball(
-            scene, model, axis, angle_deg, ball, self.axis_positions(scene)
-        )
-        count = len(angle_deg)
-        turned = np.broadcast_to(np.eye(3), (count, 3, 3))
+        model, count = self.model(scene), len(angle_deg)
+        stand = self.axis_positions(scene)
+        coordinates = placing.follow(model, {**stand, axis: angle_deg}, ball)
+        placing.check_travel(scene, coordinates, f"the path about {axis}")
+        turned = np.eye(3)
         if self.frame == "workpiece":
-            pose = np.asarray(branch_pose(model, "workpiece", coordinates))
-            turned = np.broadcast_to(pose[..., :3, :3], (count, 3, 3))
+            turned = branch_pose(model, "workpiece", coordinates)[..., :3, :3]
+        turned = np.broadcast_to(turned, (count, 3, 3))
         direction = np.concatenate([turned[:, :, index] for index in range(3)])
         ball_text = ", ".join(f"{value:.4g}" for value in ball)
         return build_plan(
@@ -299,29 +301,19 @@ class RTest(BenchTest):
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         place, residual = fit_setup(plan, readings)
         raw, residuals = readings.reshape(3, -1), residual.reshape(3, -1)
-        quantities = [
-            BenchQuantity(f"{name}_um", f"range in {name}", float(np.ptp(raw[index])), "µm")
-            for index, name in enumerate(AXES)
+        rows = [(f"{x}_um", f"range in {x}", np.ptp(raw[at])) for at, x in enumerate("xyz")]
+        rows += [
+            (f"{x}_fitted_um", f"range in {x}, ball position fitted", np.ptp(residuals[at]))
+            for at, x in enumerate("xyz")
         ]
-        quantities += [
-            BenchQuantity(
-                f"{name}_fitted_um", f"range in {name}, ball position fitted",
-                float(np.ptp(residuals[index])), "µm",
-            )
-            for index, name in enumerate(AXES)
-        ]  # fmt: skip
-        norm = np.linalg.norm(residuals, axis=0)
-        rms = float(np.sqrt(np.mean(norm**2)))
-        quantities.append(
-            BenchQuantity("rms_fitted_um", "RMS distance, position fitted", rms, "µm")
-        )
+        rms = np.sqrt(np.mean(np.linalg.norm(residuals, axis=0) ** 2))
+        rows.append(("rms_fitted_um", "RMS distance, position fitted", rms))
         details: dict[str, object] = {
             "ball_um": place.tolist(),
             "angle_deg": plan.marks["angle_deg"][: raw.shape[1]].tolist(),
         }
-        for index, name in enumerate(AXES):
-            details[f"{name}_readings_um"] = raw[index].tolist()
-        return Outcome(tuple(quantities), details)
+        details |= {f"{x}_readings_um": raw[at].tolist() for at, x in enumerate("xyz")}
+        return build_outcome(rows, details)
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
@@ -331,12 +323,8 @@ class RTest(BenchTest):
             order = np.argsort(angle, kind="stable")
             curves += [
                 run.curve(name, angle[order], rows[index][order], index)
-                for index, name in enumerate(AXES)
+                for index, name in enumerate("xyz")
             ]
         axis = runs[0].plan.place.partition(" ")[0]
-        return (
-            Lines(
-                "lines", f"Tool minus ball while {axis} turns", f"{axis} [°]", "reading [µm]",
-                tuple(curves),
-            ),
-        )  # fmt: skip
+        labels = f"Tool minus ball while {axis} turns", f"{axis} [°]", "reading [µm]"
+        return (Lines("lines", *labels, tuple(curves)),)

@@ -11,15 +11,14 @@ from warpspace.analysis.options import Axis, option
 from warpspace.bench import placing
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ALONG, DataColumn, ReadingsFile
-from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan
+from warpspace.bench.plan import BenchPlan, Outcome, build_outcome, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.conversion import fit_line
 from warpspace.machine.axes import direction_index
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-REFERENCES = ("end_points", "least_squares", "minimum_zone")  # ISO 230-1, 3.4.10 to 3.4.12
-LINE_TEXT = {
+REFERENCES = {  # ISO 230-1, 3.4.10 to 3.4.12
     "end_points": "end-point line",
     "least_squares": "least-squares line",
     "minimum_zone": "minimum-zone line",
@@ -30,7 +29,6 @@ LINE_TEXT = {
 class FittedLine:
     """A straight line through deviations."""
 
-    name: str  # one of `REFERENCES`
     slope: float  # µrad; µm per mm, times a thousand
     offset: float  # µm; at position zero
     deviation_um: float  # largest minus smallest distance from the line
@@ -39,15 +37,15 @@ class FittedLine:
         return self.offset + self.slope * 1e-3 * position_mm
 
 
-def reference_lines(position_mm: Array, deviation_um: Array) -> dict[str, FittedLine]:
-    """Fit the three reference lines to deviations, [n], µm, at two positions or more."""
-    order = np.argsort(position_mm, kind="stable")
-    x, y = position_mm[order], deviation_um[order]
+def fit_lines(position_mm: Array, readings_um: Array) -> tuple[Array, Array, dict[str, FittedLine]]:
+    """Compute the mean reading at each position, [p] twice, and its three reference lines."""
+    x, index = np.unique(np.round(position_mm, 6), return_inverse=True)
+    mean = np.bincount(index.reshape(-1), readings_um) / np.bincount(index.reshape(-1))
     lines: dict[str, FittedLine] = {}
     for name in REFERENCES:
-        offset, slope = fit_line(x, y, name.replace("points", "point"))
-        lines[name] = FittedLine(name, slope * 1e3, offset, float(np.ptp(y - slope * x)))
-    return lines
+        offset, slope = fit_line(x, mean, name.replace("points", "point"))
+        lines[name] = FittedLine(slope * 1e3, offset, float(np.ptp(mean - slope * x)))
+    return x, mean, lines
 
 
 def build_line_plan(
@@ -93,13 +91,6 @@ def build_line_plan(
     )
 
 
-def mean_by_position(position: Array, readings: Array) -> tuple[Array, Array]:
-    """Compute the mean of the readings at each position, [p] twice."""
-    places, index = np.unique(np.round(position, 6), return_inverse=True)
-    weights = np.bincount(index.reshape(-1), readings)
-    return places, weights / np.bincount(index.reshape(-1))
-
-
 @dataclass(frozen=True, kw_only=True)
 class Straightness(BenchTest):
     """Straightness of one axis in one direction."""
@@ -120,7 +111,7 @@ class Straightness(BenchTest):
     points: int = option(21, "Positions along the axis", low=3, high=2_000)
 
     def directions(self, scene: Scene) -> tuple[str, int]:
-        axis = placing.linear_axis(scene.machine, self.axis)
+        axis = placing.find_axis(scene.machine, self.axis, "linear")
         along = direction_index(axis)
         if self.across and "xyz".index(self.across) == along:
             raise OptionError(
@@ -129,13 +120,9 @@ class Straightness(BenchTest):
         return axis, "xyz".index(self.across) if self.across else (along + 1) % 3
 
     def plan(self, scene: Scene) -> BenchPlan:
-        axis, _ = self.directions(scene)
-        position = np.linspace(*scene.axis_span(axis), self.points)
-        return self._lay(
-            scene,
-            np.concatenate([position, position[::-1]]),
-            np.repeat([1.0, -1.0], self.points),
-        )
+        position = np.linspace(*scene.axis_span(self.directions(scene)[0]), self.points)
+        there_and_back = np.concatenate([position, position[::-1]])
+        return self._lay(scene, there_and_back, np.repeat([1.0, -1.0], self.points))
 
     def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         places = len(np.unique(np.round(table["position_mm"], 6)))
@@ -155,45 +142,37 @@ class Straightness(BenchTest):
         )
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
-        position, mean = mean_by_position(plan.marks["along_mm"], readings)
-        lines = reference_lines(position, mean)
-        quantities = [
-            BenchQuantity(f"{name}_um", f"straightness, {LINE_TEXT[name]}", line.deviation_um, "µm")
-            for name, line in lines.items()
-        ]
-        slopes = {name: line.slope for name, line in lines.items()}
+        position, mean, lines = fit_lines(plan.marks["along_mm"], readings)
         details = {
-            "slope_urad": slopes,
+            "slope_urad": {name: line.slope for name, line in lines.items()},
             "position_mm": position.tolist(),
             "deviation_um": mean.tolist(),
         }
-        return Outcome(tuple(quantities), details)
+        rows = [
+            (f"{name}_um", f"straightness, {REFERENCES[name]}", line.deviation_um)
+            for name, line in lines.items()
+        ]
+        return build_outcome(rows, details)
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
         for run in runs:
-            position, mean = mean_by_position(run.plan.marks["along_mm"], run.readings)
-            lines = reference_lines(position, mean)
+            position, mean, lines = fit_lines(run.plan.marks["along_mm"], run.readings)
             level = lines["least_squares"].at(position)
             curves.append(run.curve("deviation", position, mean - level))
             if run is runs[-1]:
                 curves += _lines_drawn(lines, ("end_points", "minimum_zone"), position, level)
         axis = runs[0].plan.place.partition(" ")[0]
         across = "xyz"[int(np.argmax(np.abs(runs[0].plan.direction[0])))]
-        return (
-            Lines(
-                "lines", f"Straightness of {axis} in {across}", f"along {axis} [mm]",
-                "deviation [µm]",
-                tuple(curves), (), "About the least-squares line.",
-            ),
-        )  # fmt: skip
+        labels = f"Straightness of {axis} in {across}", f"along {axis} [mm]", "deviation [µm]"
+        return (Lines("lines", *labels, tuple(curves), note="About the least-squares line."),)
 
 
 def _lines_drawn(
     lines: Mapping[str, FittedLine], names: Sequence[str], position: Array, level: Array | float
 ) -> list[Curve]:
     return [
-        Curve(LINE_TEXT[name], position, lines[name].at(position) - level, colour, "dashed")
+        Curve(REFERENCES[name], position, lines[name].at(position) - level, colour, "dashed")
         for colour, name in enumerate(names, start=1)
     ]
 
@@ -248,32 +227,26 @@ class Squareness(BenchTest):
         self, scene: Scene, line_index: Array, position: Array, travel_sign: Array
     ) -> BenchPlan:
         plane = placing.find_plane(self.model(scene), self.axis_positions(scene), self.plane)
-        lines = {plane.first: plane.second_direction, plane.second: plane.first_direction}
+        directions = plane.second_direction, plane.first_direction
+        lines = dict(zip(self.plane, directions, strict=True))
         unknowns = (*(f"zero_{axis}_um" for axis in lines), "turned_urad")
         plan = build_line_plan(self, scene, lines, line_index, position, travel_sign, unknowns)
-        marks = {
-            **plan.marks,
-            "gain_sign": np.full(len(line_index), plane.sign),
-            "line": line_index,
-        }
+        signs = np.full(len(line_index), plane.sign)
+        marks = {**plan.marks, "gain_sign": signs, "line": line_index}
         place = f"{self.plane} · {plan.place}"
         return replace(plan, place=place, marks=marks, squareness_key=plane.key)
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         key, sign = plan.squareness_key, float(plan.marks["gain_sign"][0])
-        lines = [arm_lines for _, _, arm_lines in _arms(plan, readings)]
-        quantities: list[BenchQuantity] = []
-        for name in REFERENCES:
-            angle = sign * (lines[0][name].slope + lines[1][name].slope)
-            quantities.append(
-                BenchQuantity(f"{name}_urad", f"squareness {key}, {LINE_TEXT[name]}", angle, "µrad")
-            )
-        for index, axis in enumerate(self.plane):
-            height = lines[index]["least_squares"].deviation_um
-            quantities.append(
-                BenchQuantity(f"straightness_{axis}_um", f"straightness of {axis}", height, "µm")
-            )
-        return Outcome(tuple(quantities), {"squareness_key": key})
+        first, second = (lines for _, _, lines in _arms(plan, readings))
+        rows: list[tuple[str, str, float]] = []
+        for name, line_text in REFERENCES.items():
+            angle = sign * (first[name].slope + second[name].slope)
+            rows.append((f"{name}_urad", f"squareness {key}, {line_text}", angle))
+        for axis, lines in zip(self.plane, (first, second), strict=True):
+            height = lines["least_squares"].deviation_um
+            rows.append((f"straightness_{axis}_um", f"straightness of {axis}", height))
+        return build_outcome(rows, {"squareness_key": key})
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         charts: list[Lines] = []
@@ -284,19 +257,13 @@ class Squareness(BenchTest):
                 level = mean.mean()
                 curves.append(run.curve("deviation", position, mean - level))
                 if run is runs[-1]:
-                    curves += _lines_drawn(lines, REFERENCES, position, level)
-            other = self.plane[1 - index]
-            charts.append(
-                Lines(
-                    "lines", f"{axis} runs, deviation along {other}", f"along {axis} [mm]",
-                    "deviation [µm]", tuple(curves),
-                )
-            )  # fmt: skip
+                    curves += _lines_drawn(lines, tuple(REFERENCES), position, level)
+            title = f"{axis} runs, deviation along {self.plane[1 - index]}"
+            labels = title, f"along {axis} [mm]", "deviation [µm]"
+            charts.append(Lines("lines", *labels, tuple(curves)))
         return tuple(charts)
 
 
 def _arms(plan: BenchPlan, readings: Array) -> list[tuple[Array, Array, dict[str, FittedLine]]]:
     arms = [plan.marks["line"] == index for index in (0.0, 1.0)]
-    along = plan.marks["along_mm"]
-    means = [mean_by_position(along[chosen], readings[chosen]) for chosen in arms]
-    return [(position, mean, reference_lines(position, mean)) for position, mean in means]
+    return [fit_lines(plan.marks["along_mm"][arm], readings[arm]) for arm in arms]

@@ -8,28 +8,15 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from warpspace.analysis.blocks import Block, Column, Table
+from warpspace.cli import shared_options
 from warpspace.cli.analyses import print_blocks
 from warpspace.cli.file_arguments import OutputFile, SceneName
-from warpspace.cli.shared_options import (
-    SCENES,
-    force_option,
-    grid_option,
-    json_option,
-    loop_option,
-    output_option,
-    print_json,
-    run_by,
-    scene_argument,
-    warn_first_order,
-    warn_second_order,
-    write_text,
-)
 from warpspace.cli.tables import print_table, print_text, progress
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
-    from warpspace.analysis.publications import PrintedNumber
-    from warpspace.analysis.tolerance_check import Check, Measured
+    from warpspace.analysis.registry import PrintedNumber
+    from warpspace.analysis.statistics import Check, Measured
     from warpspace.scene.model import Scene
 
 NOTES = "warpspace.cli.note_editing"
@@ -40,19 +27,16 @@ Kind = Literal["scenes", "machines"]
 
 @click.command("list")
 @click.argument("kind", type=click.Choice(("scenes", "machines")), required=False)
-@json_option
+@shared_options.json_option
 def list_(kind: Kind | None, *, as_json: bool) -> None:
     """List the bundled scenes and machines, or one of both.
 
     A scene refers to a machine by name, machine = "scara"; the scene machine_NAME shows it.
     """
-    listing = {
-        kind_name: _list_kind(kind_name)
-        for kind_name in ("scenes", "machines")
-        if kind in (None, kind_name)
-    }
+    kinds: tuple[Kind, ...] = ("scenes", "machines") if kind is None else (kind,)
+    listing = {kind_name: _list_kind(kind_name) for kind_name in kinds}
     if as_json:
-        print_json(listing)
+        shared_options.print_json(listing)
         return
     for kind_name, rows in listing.items():
         if kind is None:
@@ -67,16 +51,15 @@ def _list_kind(kind: Kind) -> list[dict[str, str | None]]:
 
     if kind == "scenes":
         return [{"name": name, "title": load_scene(name).title} for name in scene_names()]
-    pictures = {name: machine_picture(name) for name in machine_names()}
     return [
         {
             "name": machine.name,
             "title": machine.title,
             "chain": str(machine.chain),
             "source": machine.source,
-            "picture": str(picture) if picture else None,
+            "picture": str(machine_picture(machine.name) or "") or None,
         }
-        for machine, picture in ((load_machine(name), at) for name, at in pictures.items())
+        for machine in map(load_machine, machine_names())
     ]
 
 
@@ -88,9 +71,9 @@ def _lines(row: dict[str, str | None]) -> list[tuple[str, str, str]]:
 
 @click.command("new-machine")
 @click.argument("chain")
-@output_option("Scene file to write: .toml.", *SCENES)
+@shared_options.output_option("Scene file to write: .toml.", *shared_options.SCENES)
 @click.option("--title", default="", help="Title of the machine and the scene.  [the chain]")
-@force_option
+@shared_options.force_option
 def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
     """Write a scene for a machine with the axes of CHAIN.
 
@@ -104,7 +87,7 @@ def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
 
     text = starter_text(chain, title)
     scene = parse_scene(text, Path(output).stem, output)
-    write_text(output, text, force=force)
+    shared_options.write_text(output, text, force=force)
     print_text(
         f"{output}: {scene.machine.chain}, {len(scene.parameter_keys)} errors;"
         f" warpspace view {output} opens it"
@@ -112,7 +95,7 @@ def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
 
 
 @click.command()
-@scene_argument("scenes", nargs=-1, required=True)
+@shared_options.scene_argument("scenes", nargs=-1, required=True)
 @click.option(
     "--against",
     type=SceneName(),
@@ -120,9 +103,9 @@ def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
     help="Compare each error with the tolerances of this scene, for instance dvf5000_proposed, or"
     " of SCENE itself (own), and report the predicted map. Allows several SCENES.",
 )
-@loop_option
-@grid_option(11, "of the predicted map, with --against")
-@json_option
+@shared_options.loop_option
+@shared_options.grid_option(11, "of the predicted map, with --against")
+@shared_options.json_option
 def check(
     scenes: tuple[str, ...], against: str | None, loop: str | None, grid: int, *, as_json: bool
 ) -> None:
@@ -135,7 +118,7 @@ def check(
     fit to the predicted map.
     """
     from warpspace.analysis.description import to_json
-    from warpspace.analysis.tolerance_check import measured
+    from warpspace.analysis.statistics import measured
     from warpspace.scene.library import load_scene
 
     loaded = [load_scene(name) for name in scenes]
@@ -146,9 +129,9 @@ def check(
         return
     limits = None if against == OWN_TOLERANCES else load_scene(against).tolerances
     pairs = [(one, measured(one, tolerances=limits, loop=loop, grid=grid)) for one in loaded]
-    warn_first_order(loop, *loaded)
+    shared_options.warn_first_order(loop, *loaded)
     if as_json:
-        print_json(
+        shared_options.print_json(
             {
                 "machines": [
                     {
@@ -178,10 +161,10 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
 
     remarks = (*scene.notes, *check_meshes(scene.machine))
     estimate = second_order(scene)
-    warn_second_order(estimate)
+    shared_options.warn_second_order(estimate)
     non_zero = [key for key in scene.errors if scene.errors.amplitude(key) != 0.0]
     if as_json:
-        print_json(
+        shared_options.print_json(
             {
                 "scene": scene.name,
                 "title": scene.title,
@@ -209,7 +192,7 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
 
 
 @click.command()
-@scene_argument()
+@shared_options.scene_argument()
 @click.option("--add", "text", metavar="TEXT", help="Add a note with this text.")
 @click.option(
     "--at",
@@ -217,25 +200,19 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
     metavar="X=..,Y=..",
     help="Position of the new note: axis positions in mm and degrees.  [none]",
 )
-@click.option(
-    "--kind",
-    type=click.Choice(("note", "question", "decision")),
-    default="note",
-    show_default=True,
-    help="Kind of the new note.",
+@shared_options.choice_option(
+    "--kind", ("note", "question", "decision"), "Kind of the new note.", "note"
 )
 @click.option("--author", default="", help="Author of the new note.")
-@click.option(
-    "--step", type=int, default=0, help="Position in the story; 0 for none.", show_default=True
-)
-@output_option(
+@click.option("--step", default=0, help="Position in the story; 0 for none.", show_default=True)
+@shared_options.output_option(
     "File to write: the notes as .csv or .md, or with --add the scene as .toml.  [SCENE]",
     ".csv", ".md", ".toml", required=False,
 )  # fmt: skip
-@loop_option
-@force_option
-@json_option
-@run_by(f"{NOTES}:edit_notes")
+@shared_options.loop_option
+@shared_options.force_option
+@shared_options.json_option
+@shared_options.run_by(f"{NOTES}:edit_notes")
 def notes() -> None:
     """List the review notes of SCENE, or add one.
 
@@ -244,11 +221,11 @@ def notes() -> None:
 
 
 @click.command()
-@scene_argument("first")
-@scene_argument("second")
-@output_option("Scene file to write: .toml.", *SCENES)
-@force_option
-@run_by(f"{NOTES}:merge_scenes")
+@shared_options.scene_argument("first")
+@shared_options.scene_argument("second")
+@shared_options.output_option("Scene file to write: .toml.", *shared_options.SCENES)
+@shared_options.force_option
+@shared_options.run_by(f"{NOTES}:merge_scenes")
 def merge() -> None:
     """Merge the review notes of two copies of a scene.
 
@@ -258,7 +235,7 @@ def merge() -> None:
 
 
 def _measured_errors(scene: "Scene") -> list["PrintedNumber"]:
-    from warpspace.analysis.publications import PUBLICATIONS
+    from warpspace.analysis.registry import PUBLICATIONS
 
     printed = (publication.measured_error(scene) for publication in PUBLICATIONS.members())
     return [number for number in printed if number is not None]
@@ -297,8 +274,8 @@ def _limits(check: "Check") -> str:
 
 @click.command()
 @click.option("--markdown", type=OutputFile(".md"), help="Write the comparison to this .md file.")
-@force_option
-@json_option
+@shared_options.force_option
+@shared_options.json_option
 def thesis(markdown: str | None, *, force: bool, as_json: bool) -> None:
     """Recompute every number that the thesis prints.
 
@@ -306,14 +283,14 @@ def thesis(markdown: str | None, *, force: bool, as_json: bool) -> None:
     A number agrees where it lies within half of the last printed digit. Rows that do not agree say
     why. Nothing is tuned to agree.
     """
-    from warpspace.thesis_example.presentation import markdown_page, thesis_blocks, thesis_json
+    from warpspace.thesis_example.rows import markdown_page, thesis_blocks, thesis_json
     from warpspace.thesis_example.rows import thesis as compare
 
     with progress("computing", silent=as_json):
         rows = compare()
     if markdown is not None:
-        write_text(markdown, markdown_page(rows), force=force)
+        shared_options.write_text(markdown, markdown_page(rows), force=force)
     if as_json:
-        print_json(thesis_json(rows))
+        shared_options.print_json(thesis_json(rows))
         return
     print_blocks(thesis_blocks(rows))

@@ -12,6 +12,7 @@ from warpspace.cli.analyses import print_blocks
 from warpspace.cli.file_arguments import SceneName
 from warpspace.cli.shared_options import (
     FIGURES,
+    choice_option,
     component_option,
     deferred,
     direction_option,
@@ -32,12 +33,7 @@ from warpspace.cli.shared_options import (
 )
 from warpspace.cli.tables import echo, print_text, progress
 from warpspace.exceptions import OptionError, RenderError, UnknownNameError
-from warpspace.outputs.exports.formats import (
-    ExportFormat,
-    export_formats,
-    register_format,
-    write_export,
-)
+from warpspace.outputs.exports import formats
 from warpspace.outputs.figures.registry import figure_command, figure_names
 
 if TYPE_CHECKING:
@@ -48,8 +44,8 @@ SERVICES = "warpspace.cli.services"
 MOVING = (".gif", ".webp", ".mp4")
 SIZE, MOVING_SIZE = (1600, 1200), (960, 720)
 FRAMES, FPS = 48, 15.0
-register_format(
-    ExportFormat(
+formats.register_format(
+    formats.ExportFormat(
         ".html",
         "the interactive scene, one file that needs no network",
         f"{SERVICES}:write_page",
@@ -146,10 +142,10 @@ def view(
     metavar="NAME",
     help=f"Figure to draw: {', '.join(figure_names())}.  [error-map]",
 )
-@click.option(
+@choice_option(
     "--motion",
-    type=click.Choice(("exaggeration", "rotation")),
-    help="Motion: from true scale to the display factor and back, or one turn of the rotary"
+    ("exaggeration", "rotation"),
+    "Motion: from true scale to the display factor and back, or one turn of the rotary"
     " table.  [exaggeration]",
 )
 @click.option("--frames", type=int, help=f"Frames of one cycle.  [{FRAMES}]")
@@ -281,8 +277,9 @@ def compare(
 @click.command()
 @scene_argument()
 @output_option(
-    f"File to write: {', '.join(f'{form.ending} ({form.about})' for form in export_formats())}.",
-    added=lambda: [form.ending for form in export_formats()],
+    "File to write: "
+    f"{', '.join(f'{form.ending} ({form.about})' for form in formats.export_formats())}.",
+    added=lambda: [form.ending for form in formats.export_formats()],
 )
 @exaggeration_option
 @grid_option()
@@ -308,8 +305,10 @@ def export(
 
     with progress("writing"):
         picture = evaluate_picture(load_placed(scene, direction, loop), loop=loop, **options)
-        write_export(picture, Path(output), overwrite=force)
-    kind = next(form for form in export_formats() if form.ending == Path(output).suffix.lower())
+        formats.write_export(picture, Path(output), overwrite=force)
+    kind = next(
+        form for form in formats.export_formats() if form.ending == Path(output).suffix.lower()
+    )
     if kind.left_out:
         echo(f"{output}: {picture.scene.machine.title}, {size_text(output)}")
         print_text(f"  {kind.left_out}")
@@ -356,21 +355,18 @@ def export(
 )
 @click.option(
     "--samples",
-    type=int,
     default=100_000,
     show_default=True,
     help="Number of machines sampled within the tolerances.",
 )
-@click.option(
+@choice_option(
     "--distribution",
-    type=click.Choice(("uniform", "normal")),
-    default="uniform",
-    show_default=True,
-    help="Distribution: uniform over the tolerance, or normal with 3σ = half-width.",
+    ("uniform", "normal"),
+    "Distribution: uniform over the tolerance, or normal with 3σ = half-width.",
+    "uniform",
 )
 @click.option(
     "--seed",
-    type=int,
     default=0,
     show_default=True,
     help="Seed of the random numbers; equal seeds give equal results.",

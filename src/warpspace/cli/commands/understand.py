@@ -1,15 +1,8 @@
 """The command `field`: errors at points or over the working volume."""
 
-from typing import TYPE_CHECKING
-
 import click
 
 from warpspace.cli import shared_options
-
-if TYPE_CHECKING:
-    pass
-
-FIELDS = (".parquet", ".npz", ".csv", ".vts")
 
 
 @click.command()
@@ -24,17 +17,13 @@ FIELDS = (".parquet", ".npz", ".csv", ".vts")
     is_flag=True,
     help="Exact kinematic chain with full rotations, in place of the first order.",
 )
-@click.option(
-    "--frame",
-    type=click.Choice(("machine", "workpiece")),
-    default="machine",
-    show_default=True,
-    help="Frame of the resulting vectors.",
+@shared_options.choice_option(
+    "--frame", ("machine", "workpiece"), "Frame of the resulting vectors.", "machine"
 )
 @shared_options.csv_option
 @shared_options.output_option(
     "Write all points to this file: .parquet, .npz, .csv or, of a grid, .vts.",
-    *FIELDS,
+    *shared_options.FIELDS,
     required=False,
 )
 @shared_options.force_option

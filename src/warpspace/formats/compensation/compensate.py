@@ -43,11 +43,12 @@ PLACED_ASSUMPTION = (
 )
 NO_OFFSETS = ", because the format cannot correct them"
 RESOLUTION = (0.0, 0.1)  # mm or degrees
-SIZES = (3, 5, 9, 17)
 MAX_TABLES = 32  # compensations of one sweep
-GRIDLESS = ("linuxcnc-matrix", "marlin")
-"""Formats without a grid in the default sweep; the skew of Klipper equals that of Marlin."""
-TABLES = ("sinumerik-enc", "sinumerik-cec", "heidenhain", "fanuc-3d", "isg-csv")
+SWEEP = (
+    *("sinumerik-enc", "sinumerik-cec", "heidenhain", "fanuc-3d", "isg-csv"),
+    *("linuxcnc-matrix", "marlin"),
+)
+"""Formats of the default sweep; the skew of Klipper equals that of Marlin."""
 MIN_CHART_UM = 1e-3  # lower end of the chart of a sweep
 Points: TypeAlias = int | tuple[tuple[str, int], ...]
 """Points of a table: one number for all axes, or one per axis."""
@@ -173,10 +174,6 @@ class Compensation(BeforeAfter, Result):
     unplaced: BeforeAfter | None = None
 
     @property
-    def size(self) -> int:
-        return self.controller.size
-
-    @property
     def loop(self) -> str:
         return str(self.controller.loop)
 
@@ -188,17 +185,13 @@ class Compensation(BeforeAfter, Result):
     def assumed(self) -> tuple[str, ...]:
         """Assumptions about the format, the senses of the axes and the placement."""
         machine = self.controller.scene.machine
-        senses = (
-            (1, "the positive direction, according to ISO 841"),
-            (-1, "the negative direction, contrary to ISO 841"),
-        )
+        directions = {1: "positive direction, according to", -1: "negative direction, contrary to"}
         assumptions = list(self.controller.assumed)
-        for sense, direction in senses:
+        for sense, direction in directions.items():
             axes = ", ".join(axis for axis in self.axes if machine.sense(axis) == sense)
             if axes:
-                assumptions.append(
-                    f"positive {axes}: the tool moves over the workpiece in {direction}"
-                )
+                motion = f"the tool moves over the workpiece in the {direction} ISO 841"
+                assumptions.append(f"positive {axes}: {motion}")
         if self.placed:
             assumptions.append(PLACED_ASSUMPTION + ("" if self.format.offsets else NO_OFFSETS))
         return tuple(assumptions)
@@ -227,10 +220,6 @@ class Compensation(BeforeAfter, Result):
     def points_text(self) -> str:
         return format_points(self.format, self.points)
 
-    @property
-    def bytes(self) -> int:
-        return sum(len(text.encode()) for text in self.files.values())
-
     def output_files(self, _ending: str = "", /) -> Mapping[str, str]:
         return self.files
 
@@ -242,7 +231,7 @@ class Compensation(BeforeAfter, Result):
             "loop": self.loop,
             "corrected": list(self.axes),
             "points": dict(self.points) if self.format.has_grid else {},
-            "numbers": self.size,
+            "numbers": self.controller.size,
             "files": [],
             "before": to_json(self.before_statistics),
             "after": to_json(after) | self.expected,
@@ -266,21 +255,23 @@ class Compensation(BeforeAfter, Result):
             *number_columns(("mean", "RMS", "P95", "max"), ".3f", "µm"),
             *number_columns(("mean tilt", "max tilt"), ".2f", "µrad"),
         )
-        rows: list[tuple[str | float, ...]] = []
         unplaced = {"without placement fit": self.unplaced} if self.unplaced else {}
-        for direction, errors in {"": self, **unplaced, **self.directions}.items():
-            before, after = errors.before_statistics.four, errors.after_statistics.four
-            rows += [
-                (f"before {direction}".rstrip(), *before, *errors.tilt_urad(errors.before)),
-                (f"after {direction}".rstrip(), *after, *errors.tilt_urad(errors.after)),
-            ]
+        rows = [
+            (f"{name} {direction}".rstrip(), *statistics.four, *errors.tilt_urad(field))
+            for direction, errors in {"": self, **unplaced, **self.directions}.items()
+            for name, statistics, field in (
+                ("before", errors.before_statistics, errors.before),
+                ("after", errors.after_statistics, errors.after),
+            )
+        ]
         yield Table(columns, rows)
         named = {"before": self.before_statistics, "after": self.after_statistics}
         yield from u95_lines(self.field_uncertainty and self.field_uncertainty.errors, named)
         rms = self.expected.get("expected_rms_um")
         if rms is not None:
             yield f"  expected RMS on the machine {rms:.2f} µm, with the uncertainty of its errors"
-        yield f"  {self.size} numbers; corrected: {', '.join(self.axes)}; {self.points_text}"
+        axes = ", ".join(self.axes)
+        yield f"  {self.controller.size} numbers; corrected: {axes}; {self.points_text}"
         yield from (f"  assumed: {text}" for text in self.assumed)
         yield from (f"  {text}" for text in self.notes)
 
@@ -357,12 +348,9 @@ def compensate(
     directions: dict[str, BeforeAfter] = {}
     reversal: tuple[str, ...] = ()
     if scene.errors.has_directions:
-        forward, backward = (
-            evaluate_before_after(fixed, grid, direction)  # one placement for both
-            for direction in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
-        )
-        directions = {"forward": forward, "backward": backward}
-        reversal = reversal_notes(forward, backward, scene.errors, scene.model.direction)
+        for direction in ("forward", "backward"):  # one placement for both
+            directions[direction] = evaluate_before_after(fixed, grid, direction)
+        reversal = reversal_notes(directions, scene.errors, scene.model.direction)
         check_cancelled()
     return Compensation(
         comparison.before, comparison.after, grid, comparison.field_uncertainty, kind, files,
@@ -480,11 +468,11 @@ class Sweep(Result):
 
 
 def sweep(scene: Scene, options: Compensate) -> Sweep:
-    names = list(dict.fromkeys(options.formats)) or [*TABLES, *GRIDLESS]
+    names = list(dict.fromkeys(options.formats)) or [*SWEEP]
     tables: list[tuple[str, int]] = []
     for name in names:
-        kind, sizes = find_format(name), options.sweep or SIZES
-        counts = [count for count in sizes if 2 <= count <= kind.most_points]
+        kind = find_format(name)
+        counts = [count for count in options.sweep if count <= kind.most_points]
         if not kind.has_grid:
             counts = [0]
         tables += [(name, count) for count in counts]
@@ -496,6 +484,7 @@ def sweep(scene: Scene, options: Compensate) -> Sweep:
     before: Statistics | None = None
     steps: list[SweepStep] = []
     left_out: dict[str, str] = {}
+    ranges = scene.workspace.ranges.items()
     for name, count in tables:
         kind = find_format(name)
         single = replace(
@@ -513,20 +502,25 @@ def sweep(scene: Scene, options: Compensate) -> Sweep:
             left_out[name] = str(error)
             continue
         before = compensation.before_statistics
-        steps.append(_step(scene, compensation, count))
+        points = compensation.points
+        steps.append(
+            SweepStep(
+                format=name,
+                points=count,
+                numbers=compensation.controller.size,
+                bytes=sum(len(text.encode()) for text in compensation.files.values()),
+                pitch=max(
+                    np.ptp(span) / (points[axis] - 1) for axis, span in ranges if axis in points
+                )
+                if count
+                else 0.0,
+                after=compensation.after_statistics,
+                placed=compensation.placed,
+            )
+        )
     if before is None:
         raise OptionError(
             f"{{sweep}}: none of the tables is possible: {'; '.join(left_out.values())}"
         )
     reasons = tuple(f"{name}: {reason}" for name, reason in left_out.items())
     return Sweep(title=title, before=before, steps=tuple(steps), left_out=reasons)
-
-
-def _step(scene: Scene, compensation: Compensation, count: int) -> SweepStep:
-    spans = [
-        (scene.workspace.ranges[axis][1] - scene.workspace.ranges[axis][0]) / (number - 1)
-        for axis, number in compensation.points.items()
-    ]
-    pitch = max(spans) if count else 0.0
-    size, after = (compensation.size, compensation.bytes), compensation.after_statistics
-    return SweepStep(compensation.format.name, count, *size, pitch, after, compensation.placed)

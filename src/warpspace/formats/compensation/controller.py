@@ -1,5 +1,6 @@
 """A controller with a compensation table: its corrections and the residual error."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,6 +13,7 @@ from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, fit_placement
 from warpspace.field.grid import Grid, build_grid
 from warpspace.formats.compensation.corrections import Corrector, MovedPoints, RequiredCorrections
+from warpspace.formats.measured import RUN_DIRECTION, UNDIRECTED
 from warpspace.formats.registry import Files, Format, Reading, ReadOptions
 from warpspace.formats.source import source_of_text
 from warpspace.formats.terms import Tables
@@ -20,8 +22,6 @@ from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection
 from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene, with_direction
 from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
-
-TRAVEL_SIGN = {TravelDirection.FORWARD: 1, TravelDirection.BACKWARD: -1}
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,9 @@ class CorrectedPoints:
         if self.placement_nodes is not None:
             grid, nodes = self.placement_nodes
             placement = fit_placement(self.points.model, grid, nodes.field(errors).error_um)
-        position, orientation = self.points.without(placement, *self.points.residual(errors))
+        position, orientation = self.points.residual(errors, placement)
         if self.reference is not None:
-            still, _ = self.reference.without(placement, *self.reference.residual(errors))
-            position = position - still
+            position = position - self.reference.residual(errors, placement)[0]
         shape = np.broadcast_shapes(position.shape, self.nominal_mm.shape)
         error_field = ErrorField(
             np.broadcast_to(self.nominal_mm, shape),
@@ -76,9 +75,8 @@ class Controller:
     label: str  # title of the format and points of the table
     # the corrected axes; without a table, with the errors that the files contain
     corrector: Corrector
-    tables: (
-        Tables | None
-    )  # None where the controller computes its corrections from error parameters
+    # None where the controller computes its corrections from error parameters
+    tables: Tables | None
     size: int  # count of stored numbers
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -87,7 +85,7 @@ class Controller:
         """Return the corrections at commanded positions, by axis."""
         travel = TravelDirection(direction or self.scene.model.direction)
         if self.tables is not None:
-            return dict(self.tables.corrections(coordinates, TRAVEL_SIGN.get(travel, 0)))
+            return dict(self.tables.corrections(coordinates, RUN_DIRECTION.get(travel, UNDIRECTED)))
         model = replace(self.corrector.model, direction=travel)
         return replace(self.corrector, model=model).moves(coordinates)
 
@@ -109,19 +107,19 @@ class Controller:
             )
             return replace(forward, subtracted=backward)
         machine = Corrector(scene.model, scene.errors, loop, ())
-        reference = _reference(scene, coordinates)
+        reference = None
+        if scene.reference is not None:
+            still = {axis: scene.reference.get(axis, at) for axis, at in coordinates.items()}
+            still = {axis: np.asarray(at) for axis, at in still.items()}
+            reference = machine.move(still, self.moves(still, travel))
         placement_volume, placement_nodes = scene.view(loop).placed_over, None
         if placement_volume is not None:
             grid = build_grid(scene.model, placement_volume)
             absolute = replace(scene, reference=None, placed=False)
             nodes = self.at(grid.coordinates, grid.nominal_mm, absolute, loop, grid.point_mm)
             placement_nodes = grid, nodes
-        return CorrectedPoints(
-            nominal_mm,
-            machine.move(coordinates, self.moves(coordinates, travel), point_mm),
-            None if reference is None else machine.move(reference, self.moves(reference, travel)),
-            placement_nodes=placement_nodes,
-        )
+        points = machine.move(coordinates, self.moves(coordinates, travel), point_mm)
+        return CorrectedPoints(nominal_mm, points, reference, placement_nodes=placement_nodes)
 
     def field(
         self,
@@ -133,17 +131,6 @@ class Controller:
     ) -> ErrorField:
         errors = (scene or self.scene).errors
         return self.at(coordinates, nominal_mm, scene, loop, point_mm).field(errors)
-
-    def without(self) -> "Controller":
-        """Return the controller with an empty table."""
-        return replace(self, tables=Tables(()))
-
-
-def _reference(scene: Scene, coordinates: Coordinates) -> dict[str, Array] | None:
-    if scene.reference is None:
-        return None
-    still = scene.reference
-    return {axis: np.asarray(still.get(axis, at)) for axis, at in coordinates.items()}
 
 
 def read_back(
@@ -172,28 +159,26 @@ def read_back(
             " parameters is fixed; expected a table of corrections"
         )
     model = replace(imported_scene.model, direction=scene.model.direction)
-    notes = list(imported.notes)
     lost = [key for key in scene.errors if key not in errors and scene.errors.amplitude(key)]
-    if lost:
-        notes.append(f"the format cannot represent {', '.join(lost)}")
     partly = [
         key
         for key in scene.errors
         if key in errors and set(scene.errors.arguments(key)) - set(errors.arguments(key))
     ]
-    if partly:
-        notes.append(f"the format represents {', '.join(partly)} over fewer axes than the scene")
     differing = [
         axis
         for axis in scene.machine.axes
         if model.convention(axis).name != scene.model.convention(axis).name
     ]
-    if differing:
-        notes.append(f"the format uses a different convention for errors of {', '.join(differing)}")
+    limits = {
+        "cannot represent {}": lost,
+        "represents {} over fewer axes than the scene": partly,
+        "uses a different convention for errors of {}": differing,
+    }
+    notes = [f"the format {text.format(', '.join(of))}" for text, of in limits.items() if of]
     corrector = replace(corrector, model=model, errors=errors)
-    return Controller(
-        scene, corrector.loop, label, corrector, None, imported.size, imported.assumed, tuple(notes)
-    )
+    stated = (imported.size, imported.assumed, (*imported.notes, *notes))
+    return Controller(scene, corrector.loop, label, corrector, None, *stated)
 
 
 MAX_REVERSAL_SHARE = 0.05
@@ -237,15 +222,16 @@ class BeforeAfter:
 def evaluate_before_after(controller: Controller, grid: Grid, direction: str) -> BeforeAfter:
     at, nominal, scene = grid.coordinates, grid.nominal_mm, controller.scene
     scene = with_direction(scene, direction)
-    before = controller.without().field(at, nominal, scene)
+    before = replace(controller, tables=Tables(())).field(at, nominal, scene)
     view = scene.view(controller.loop)
     uncertainty = field_uncertainty(scene, before.error_um, at, view, grid.point_mm, grid.weights)
     return BeforeAfter(before, controller.field(at, nominal, scene), grid, uncertainty)
 
 
 def reversal_notes(
-    forward: BeforeAfter, backward: BeforeAfter, errors: ErrorSet, direction: str
+    directions: Mapping[str, BeforeAfter], errors: ErrorSet, direction: str
 ) -> tuple[str, ...]:
+    forward, backward = directions["forward"], directions["backward"]
     before, after = (
         float((first - second).norm_um.max())
         for first, second in ((forward.before, backward.before), (forward.after, backward.after))

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,33 +38,28 @@ class MovedPoints:
     shift_mm: Array
     turn_rad: Array  # [..., 3]; rotation of the tool axis
 
-    def residual(self, errors: ErrorSet) -> tuple[Array, Array]:
-        """Compute the residual error, mm and rad; see `Corrector.residual`."""
-        view = View(self.loop)
-        field = evaluate_exact(self.model, errors, self.coordinates, view, self.point_mm)
+    def residual(self, errors: ErrorSet, placement: Array | None = None) -> tuple[Array, Array]:
+        """Compute the residual error, mm and rad, less the effect of a placement.
+
+        In the relative loop it is that on the part, which its own errors rotate.
+        """
+        at, point_mm = self.coordinates, self.point_mm
+        field = evaluate_exact(self.model, errors, at, View(self.loop), point_mm)
         error_um = field.error_um
-        if self.loop is Loop.RELATIVE:  # on the part, which its own errors rotate
-            values = error_values(self.model, errors, self.coordinates)
+        if self.loop is Loop.RELATIVE:
+            values = error_values(self.model, errors, at)
             nominal, actual = (
-                branch_pose(self.model, "workpiece", self.coordinates, rotated)[..., :3, :3]
+                branch_pose(self.model, "workpiece", at, rotated)[..., :3, :3]
                 for rotated in (None, values)
             )
             error_um = transforms.rotate(nominal @ np.swapaxes(actual, -1, -2), error_um)
-        return (
-            self.shift_mm + error_um * MM_PER_UM,
-            self.turn_rad + field.orientation_urad * RAD_PER_URAD,
-        )
-
-    def without(
-        self, placement: Array | None, position_mm: Array, orientation_rad: Array
-    ) -> tuple[Array, Array]:
-        """Subtract the effect of a placement of the workpiece from a residual error."""
-        if placement is None:
-            return position_mm, orientation_rad
-        shift_um, turn_urad = placement_effect(
-            self.model, placement, self.coordinates, self.point_mm
-        )
-        return position_mm - shift_um * MM_PER_UM, orientation_rad - turn_urad * RAD_PER_URAD
+        position = self.shift_mm + error_um * MM_PER_UM
+        orientation = self.turn_rad + field.orientation_urad * RAD_PER_URAD
+        if placement is not None:
+            shift_um, turn_urad = placement_effect(self.model, placement, at, point_mm)
+            position = position - shift_um * MM_PER_UM
+            orientation = orientation - turn_urad * RAD_PER_URAD
+        return position, orientation
 
 
 @dataclass(frozen=True)
@@ -86,47 +82,40 @@ class Corrector:
 
     def residual(self, coordinates: Coordinates, moves: Mapping[str, Array]) -> tuple[Array, Array]:
         """Compute the residual error at commanded positions after moves of the axes."""
-        moved = self.move(coordinates, moves)
-        return moved.without(self.placement, *moved.residual(self.errors))
+        return self.move(coordinates, moves).residual(self.errors, self.placement)
 
     def move(
-        self, coordinates: Coordinates, moves: Mapping[str, Array], point_mm: Array | None = None
-    ) -> "MovedPoints":
-        """Compute the part of a residual that does not depend on the errors; see `residual`."""
-        after = {axis: q + moves[axis] if axis in moves else q for axis, q in coordinates.items()}
-        return MovedPoints(
-            self.model, self.loop, after, *self._nominal_motion(coordinates, after, point_mm)
-        )
-
-    def _nominal_motion(
-        self, before: Coordinates, after: Coordinates, point_mm: Array | None = None
-    ) -> tuple[Array, Array, Array]:
-        """Compute a point after a move, its displacement, and the rotation of the tool axis.
+        self,
+        coordinates: Coordinates,
+        moves: Mapping[str, Array | float],
+        point_mm: Array | None = None,
+    ) -> MovedPoints:
+        """Compute the part of a residual that does not depend on the errors; see `residual`.
 
         The default point is the tool point. In the workpiece loop it is fixed to the workpiece; in
         the relative loop the displacement is that of the tool relative to the workpiece.
         """
-        start = nominal_point(self.model, Loop.TOOL, before) if point_mm is None else point_mm
-        aim, end = tool_axis(self.model, before), tool_axis(self.model, after)
-        if self.loop is Loop.TOOL:
-            point = self._tool_point(before, after, point_mm)
-            return point, point - start, np.cross(aim, end)
-        carried = self._carried("workpiece", before, after)
-        rides, turned = (
-            transforms.apply(carried, start),
-            transforms.rotate(carried[..., :3, :3], aim),
-        )
+        model = self.model
+        after = {axis: q + moves[axis] if axis in moves else q for axis, q in coordinates.items()}
+        start = nominal_point(model, Loop.TOOL, coordinates) if point_mm is None else point_mm
+        aim = tool_axis(model, coordinates)
+        carried, turned = start, aim  # by the workpiece
+        if self.loop is not Loop.TOOL:
+            motion = self._motion("workpiece", coordinates, after)
+            carried = transforms.apply(motion, start)
+            turned = transforms.rotate(motion[..., :3, :3], aim)
         if self.loop is Loop.WORKPIECE:
-            return rides, rides - start, np.cross(aim, turned)
-        point = self._tool_point(before, after, point_mm)
-        return point, point - rides, np.cross(turned, end)
+            shift, turn = carried - start, np.cross(aim, turned)
+            return MovedPoints(model, self.loop, after, carried, shift, turn)
+        point = (
+            nominal_point(model, Loop.TOOL, after)
+            if point_mm is None
+            else transforms.apply(self._motion("tool", coordinates, after), point_mm)
+        )
+        turn = np.cross(turned, tool_axis(model, after))
+        return MovedPoints(model, self.loop, after, point, point - carried, turn)
 
-    def _tool_point(self, before: Coordinates, after: Coordinates, point_mm: Array | None) -> Array:
-        if point_mm is None:
-            return nominal_point(self.model, Loop.TOOL, after)
-        return transforms.apply(self._carried("tool", before, after), point_mm)
-
-    def _carried(self, side: str, before: Coordinates, after: Coordinates) -> Array:
+    def _motion(self, side: str, before: Coordinates, after: Coordinates) -> Array:
         return branch_pose(self.model, side, after) @ transforms.inverse(
             branch_pose(self.model, side, before)
         )
@@ -135,9 +124,10 @@ class Corrector:
         shape = batch_shape(coordinates)
         total = {axis: np.zeros(shape) for axis in self.moved}
         shift, _ = self.response(coordinates, self.axes)
-        inverse_shift = _inverse(shift)
         carried, turn = self.response(coordinates, self.tilting)
-        upright = _inverse(turn)
+        inverse_shift, upright = (
+            np.linalg.pinv(response, rcond=RELATIVE_CUTOFF) for response in (shift, turn)
+        )
         for _ in range(NEWTON_STEPS):
             position, orientation = self.residual(coordinates, total)
             if self.tilting:
@@ -149,31 +139,17 @@ class Corrector:
         return total
 
     def response(self, coordinates: Coordinates, axes: Sequence[str]) -> tuple[Array, Array]:
-        shifts: list[Array] = []
-        turns: list[Array] = []
-        shape = (*batch_shape(coordinates), 3)
-        for axis in axes:
+        """Compute displacement and rotation of the tool per move of each axis,[..., 3, axes]."""
+        shift, turn = np.zeros((2, *batch_shape(coordinates), 3, len(axes)))
+        for index, axis in enumerate(axes):
             small = SMALL_MM if is_linear(axis) else SMALL_DEG
-            plus = {**coordinates, axis: coordinates[axis] + small}
-            minus = {**coordinates, axis: coordinates[axis] - small}
-            _, shift_plus, turn_plus = self._nominal_motion(coordinates, plus)
-            _, shift_minus, turn_minus = self._nominal_motion(coordinates, minus)
-            shifts.append(np.broadcast_to((shift_plus - shift_minus) / (2.0 * small), shape))
-            turns.append(np.broadcast_to((turn_plus - turn_minus) / (2.0 * small), shape))
-        none = np.zeros((*shape, 0))
-        return (
-            np.stack(shifts, -1) if shifts else none,
-            np.stack(turns, -1) if turns else none,
-        )
+            plus, minus = (self.move(coordinates, {axis: step}) for step in (small, -small))
+            shift[..., index] = (plus.shift_mm - minus.shift_mm) / (2.0 * small)
+            turn[..., index] = (plus.turn_rad - minus.turn_rad) / (2.0 * small)
+        return shift, turn
 
 
-def _inverse(matrix: Array) -> Array:
-    if not matrix.shape[-1]:
-        return np.swapaxes(matrix, -1, -2)
-    return np.asarray(np.linalg.pinv(matrix, rcond=RELATIVE_CUTOFF), dtype=np.float64)
-
-
-def _times(matrix: Array, vector: Array) -> Array:
+def _times(matrix: Any, vector: Array) -> Array:
     return np.einsum("...ij,...j->...i", matrix, vector)
 
 
@@ -223,8 +199,7 @@ class RequiredCorrections:
     scene: Scene
     corrector: Corrector
     points: Mapping[str, int]  # points of the table along each axis of the volume
-    # of a value, mm or degrees; 0 for all printed digits
-    resolution: float = 0.0
+    resolution: float = 0.0  # of a value, mm or degrees; 0 for all printed digits
     # "error" or "correction"; empty for the sign that the manual of the controller states
     sign: str = ""
     stem: str = "compensation"  # name of the files, without suffix
@@ -278,12 +253,13 @@ class RequiredCorrections:
         coordinates |= dict(zip(self.axes, meshed, strict=True))
         return self.corrector.moves(coordinates)
 
+    @property
     def _coarse_positions(self) -> dict[str, Array]:
         ranges = self.scene.workspace.ranges
         return {axis: np.linspace(*ranges[axis], OTHER_NODES) for axis in self.axes}
 
     def averaged(self, axes: Sequence[str]) -> dict[str, Array]:
-        places = self._coarse_positions() | {axis: self.positions(axis) for axis in axes}
+        places = self._coarse_positions | {axis: self.positions(axis) for axis in axes}
         weights = shares(OTHER_NODES)
         averages = self.corrections(places)
         for index in reversed(range(len(self.axes))):
@@ -308,7 +284,7 @@ class RequiredCorrections:
                 f"the matrix is of X, Y and Z; the machine {machine.chain} has {axes}, no {missing}"
             )
         corrector, axes = self.corrector, self.axes
-        places = self._coarse_positions()
+        places = self._coarse_positions
         still = {name: np.asarray(q) for name, q in scene.workspace.positions.items()}
         meshed = np.meshgrid(*(places[axis] for axis in axes), indexing="ij")
         nodes = still | {axis: q.ravel() for axis, q in zip(axes, meshed, strict=True)}

@@ -29,7 +29,6 @@ from warpspace.scene.text_files import CsvRows, unguard_cell
 from warpspace.units import Array
 
 RUN, DIRECTION = "run", "direction"
-SIGNS = {measured.FORWARD: "+", measured.BACKWARD: "-", measured.UNDIRECTED: ""}
 DIGITS = 6  # decimals of a value, µm or µrad
 UNITS = "# Units are in brackets and may be changed: um mm nm in, urad mrad rad arcsec deg."
 
@@ -96,10 +95,10 @@ def write(corrections: RequiredCorrections) -> Files:
     errors = measured.sample_errors(corrections)
     readings = measured.readings_of_errors(errors, corrections.scene.machine)
     for table in measured.build_error_tables(readings):
-        directed = [DIRECTION] if table.directed else []
+        directed = [DIRECTION] if any(direction for _, direction, _ in table.rows) else []
         rows = [[*map(_position, table.axes), *directed, *map(_value, table.keys)]]
         for at, direction, values in table.rows:
-            signs = [SIGNS[direction]] if directed else []
+            signs = [measured.SIGNS[direction]] if directed else []
             numbers = [format_number(number, DIGITS) for number in values]
             rows.append([*map(repr, at), *signs, *numbers])
         name = ("constant", *table.axes[:1], table.keys[0])[len(table.axes)]
@@ -113,16 +112,9 @@ def write(corrections: RequiredCorrections) -> Files:
 NAME = "csv"
 POSITION, ERROR, UNCERTAINTY = "position", "error", "uncertainty"
 DIRECTIONS: Mapping[str, int] = {
-    "": measured.UNDIRECTED,
-    "0": measured.UNDIRECTED,
-    "+": measured.FORWARD,
-    "1": measured.FORWARD,
-    "+1": measured.FORWARD,
-    "forward": measured.FORWARD,
-    "-": measured.BACKWARD,
-    "-1": measured.BACKWARD,
-    "−": measured.BACKWARD,
-    "backward": measured.BACKWARD,
+    **dict.fromkeys(("", "0"), measured.UNDIRECTED),
+    **dict.fromkeys(("+", "1", "+1", "forward"), measured.FORWARD),
+    **dict.fromkeys(("-", "-1", "−", "backward"), measured.BACKWARD),
 }
 _HEADING = re.compile(
     r"(?:(u)\s*\(\s*)?([A-Za-z0-9]+)\s*\)?\s*"
@@ -217,9 +209,8 @@ def _column(at: SourceLine, heading: str) -> _CsvColumn:
     else:
         errors = (f"E{a}{b}" for a in "XYZABC" for b in "XYZABC")
         hint = near_miss(name, [*"XYZABCUVW", *errors])
-        at.refuse(
-            f"column {quote(heading)}", f"an axis, an error, u(error), run or direction{hint}"
-        )
+        expected = f"an axis, an error, u(error), run or direction{hint}"
+        at.refuse(f"column {quote(heading)}", expected)
     if not unit:
         units = ", ".join(name for name in factors if name.isascii())
         at.refuse(f"column {name} has no unit", f"{name} [unit], with one of {units}")
@@ -242,18 +233,16 @@ def _read_one(source: Source) -> measured.ImportedErrors:
     rows: list[_Row] = []
     for number, cells in csv_rows:
         at = source.at(number)
-        row: dict[tuple[str, str], float] = {}
-        for column, cell in zip(columns, cells, strict=True):
-            row[column.role, column.name] = column.value(cell, at, csv_rows)
+        pairs = zip(columns, cells, strict=True)
+        row = {(column.role, column.name): column.value(x, at, csv_rows) for column, x in pairs}
         rows.append((at, row))
     csv_rows.check()
     if not rows:
         head.refuse("has no rows below its header", "at least one")
-    table = _CsvTable(source, head, columns, tuple(rows))
+    imported = _errors(_CsvTable(source, head, columns, tuple(rows)))
     units = tuple(dict.fromkeys(column.unit for column in columns if column.unit))
-    notes = (*source.notes, *csv_rows.notes)
-    imported = _errors(table)
-    return replace(imported, units=units, notes=(*notes, *imported.notes))
+    notes = (*source.notes, *csv_rows.notes, *imported.notes)
+    return replace(imported, units=units, notes=notes)
 
 
 def _errors(table: _CsvTable) -> measured.ImportedErrors:
@@ -363,13 +352,13 @@ def _surfaces(table: _CsvTable) -> measured.ImportedErrors:
         for direction, (at, row) in zip(table.directions(), table.rows, strict=True):
             point = (at, row[POSITION, axis], row[POSITION, other], row[ERROR, key])
             points.setdefault(direction, []).append(point)
-        surfaces.append(
-            measured.build_surface_by_direction(key, (axis, other), points, table.source)
-        )
+        axes = (axis, other)
+        surfaces.append(measured.build_surface_by_direction(key, axes, points, table.source))
     return measured.ImportedErrors(NAME, surfaces=tuple(surfaces))
 
 
-FORMAT = Format(
-    **describe(NAME), limits=f"{MAX_POINTS:,} rows", recognise=recognise, read=read, write=write
+FORMATS = (
+    Format(
+        **describe(NAME), limits=f"{MAX_POINTS:,} rows", recognise=recognise, read=read, write=write
+    ),
 )
-FORMATS = (FORMAT,)

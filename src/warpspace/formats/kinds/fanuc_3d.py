@@ -58,7 +58,7 @@ def _grid(source: Source, options: ReadOptions) -> Grid3:
         numbers = (csv_rows.number(part, number, "position") for part in parts[1:4])
         place = [at.checked_position(q, "position") for q in numbers]
         counts = [at.integer(part, "correction", -MAX_COUNT - 1, MAX_COUNT) for part in parts[4:]]
-        rows.append([*place, *(float(c) for c in counts)])
+        rows.append([*place, *counts])
     csv_rows.check()
     table = np.array(rows).reshape(-1, 6)
     along = [np.unique(table[:, index]) for index in range(3)]
@@ -75,10 +75,9 @@ def _grid(source: Source, options: ReadOptions) -> Grid3:
             problem = f"steps of {steps.min():g} to {steps.max():g} mm along {axis}"
             source.refuse(problem, "equal steps, a requirement of the control")
     ordered = table[np.lexsort(table[:, :3].T[::-1])].reshape(*shape, 6)
-    first, second, third = (options.axis_named(axis, source) for axis in "XYZ")
+    x, y, z = (options.axis_named(axis, source) for axis in "XYZ")
     values = options.factor(CORRECTION) * ordered[..., 3:] * unit * magnification
-    x, y, z = (tuple(places.tolist()) for places in along)
-    return Grid3((first, second, third), (x, y, z), values)
+    return Grid3((x, y, z), tuple(tuple(places.tolist()) for places in along), values)
 
 
 def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:

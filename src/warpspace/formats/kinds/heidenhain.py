@@ -13,7 +13,7 @@ import numpy as np
 from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, describe
 from warpspace.formats.source import Source, SourceLine
-from warpspace.formats.terms import HOLD_ENDS, AxisTable, Tables
+from warpspace.formats.terms import AxisTable, Tables
 from warpspace.machine.axes import TravelDirection
 from warpspace.units import Array
 
@@ -92,15 +92,12 @@ def _assignment(sources: Sequence[Source]) -> tuple[dict[str, list[str]], list[S
 
 
 def _lookup_axis(source: Source, axes: dict[str, list[str]], options: ReadOptions) -> str:
-    stem = source.stem.upper()
-    named, last = axes.get(stem, []), stem.rsplit("_", 1)[-1]
+    named = axes.get(source.stem.upper(), [])
     if len(named) > 1:
         source.refuse(f"is entered for {', '.join(named)}", "one axis per table")
-    last = last if len(last) == 1 and last in "XYZUVWABC" else ""
-    axis = (named or [options.axis or last])[0]
-    if not axis:
-        source.refuse("does not state its axis", "its .CMA file with it, or --axis X")
-    return options.axis_named(axis, source)
+    if named:
+        return options.axis_named(named[0], source)
+    return options.axis_of_file(source, "its .CMA file with it, or --axis X")
 
 
 def _lines(source: Source, along: str, options: ReadOptions) -> list[AxisTable]:
@@ -111,7 +108,12 @@ def _lines(source: Source, along: str, options: ReadOptions) -> list[AxisTable]:
     if POSITION not in rows[0][1] or not columns:
         source.refuse(f"expected the columns {POSITION} and one for each corrected axis")
     places = np.array([at.position(cells[POSITION], POSITION) for at, cells in rows])
-    _check_steps(places, rows)
+    steps = np.diff(places)
+    for before, place, step, (at, _) in zip(places[:-1], places[1:], steps, rows[1:], strict=True):
+        at.ascending(place, before, POSITION)
+        if abs(step - steps[0]) > max(STEP_SHARE * steps[0], 2.0 * RESOLUTION):
+            expected = "equal steps, a requirement of the control"
+            at.refuse(f"step of {step:g} after steps of {steps[0]:g}", expected)
     factor = options.factor(ERROR)
     lines: list[AxisTable] = []
     for column in columns:
@@ -133,24 +135,10 @@ def _lines(source: Source, along: str, options: ReadOptions) -> list[AxisTable]:
                 factor * at.position(cells[BACKLASH] or cells[column], BACKLASH)
                 for at, cells in rows
             )
-        lines.append(
-            AxisTable(
-                along, target, tuple(places.tolist()), tuple(values.tolist()), HOLD_ENDS, backward
-            )
-        )
+        corrections = tuple(values.tolist())
+        table = AxisTable(along, target, tuple(places.tolist()), corrections, backward=backward)
+        lines.append(table)
     return lines
-
-
-def _check_steps(places: np.ndarray, rows: Sequence[tuple[SourceLine, Cells]]) -> None:
-    steps = np.diff(places)
-    for index, step in enumerate(steps):
-        at, _ = rows[index + 1]
-        if step <= 0.0:
-            problem = f"{POSITION} {places[index + 1]:g} after {places[index]:g}"
-            at.refuse(problem, "ascending positions")
-        if abs(step - steps[0]) > max(STEP_SHARE * steps[0], 2.0 * RESOLUTION):
-            expected = "equal steps, a requirement of the control"
-            at.refuse(f"step of {step:g} after steps of {steps[0]:g}", expected)
 
 
 def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
@@ -228,11 +216,9 @@ def _format_table(name: str, rows: Sequence[Sequence[str]], width: int = WIDTH) 
     return "\r\n".join([*lines, "[END]"]) + "\r\n"
 
 
-FORMAT = Format(
-    **describe("heidenhain"),
-    recognise=recognise,
-    tables=read_tables,
-    write=write,
-    most_points=MAX_TABLE_POINTS,
-)
-FORMATS = (FORMAT,)
+FORMATS = (
+    Format(
+        **describe("heidenhain"), recognise=recognise, tables=read_tables, write=write,
+        most_points=MAX_TABLE_POINTS,
+    ),
+)  # fmt: skip

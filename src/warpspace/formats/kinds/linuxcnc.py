@@ -18,8 +18,8 @@ import numpy as np
 
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
 from warpspace.formats.registry import Files, Format, ReadOptions, describe, has_pattern
-from warpspace.formats.source import Source, SourceLine, format_comment, format_number, quote
-from warpspace.formats.terms import HOLD_ENDS, Affine, AxisTable, Tables
+from warpspace.formats.source import Source, format_comment, format_number, quote
+from warpspace.formats.terms import Affine, AxisTable, Tables
 from warpspace.machine.axes import TravelDirection, is_linear
 
 MAX_ROWS = 256
@@ -39,23 +39,10 @@ Joint = tuple[str, str, float]  # axis, type of the table, mm or degrees per mac
 
 
 def _is_comp(head: str, name: str) -> bool:
-    if re.search(r"^\s*COMP_FILE\s*=", head, re.MULTILINE):
+    if name.lower().endswith(".comp") or re.search(r"^\s*COMP_FILE\s*=", head, re.MULTILINE):
         return True
     rows = [line for line in head.splitlines() if line.strip()]
-    if name.lower().endswith(".comp"):
-        return True
-    return len(rows) > 1 and all(_ROW.match(line) for line in rows)
-
-
-def _assignment(sources: Sequence[Source]) -> tuple[dict[str, Joint], list[Source]]:
-    joints: dict[str, Joint] = {}
-    tables: list[Source] = []
-    for source in sources:
-        if re.search(r"^[ \t]*+COMP_FILE", source.text, re.MULTILINE):
-            joints |= _read_ini(source)
-        else:
-            tables.append(source)
-    return joints, tables
+    return len(rows) > 1 and all(map(_ROW.match, rows))
 
 
 def _read_ini(source: Source) -> dict[str, Joint]:
@@ -70,21 +57,16 @@ def _read_ini(source: Source) -> dict[str, Joint]:
         if bare.startswith("["):
             if axis and file:
                 joints[file] = (axis, kind, per_unit if is_linear(axis) else 1.0)
-            axis, file, kind = _joint_axis(at, bare, axes), "", POSITIONS
+            section, axis, file, kind = _SECTION.fullmatch(bare), "", "", POSITIONS
+            if section is not None:
+                if int(section[1]) >= len(axes):
+                    at.refuse(f"section {bare}", f"a joint from 0 to {len(axes) - 1}, {axes}")
+                axis = axes[int(section[1])]
         elif key == "COMP_FILE":
             file = setting.rsplit("/", 1)[-1]
         elif key == "COMP_FILE_TYPE":
             kind = f"type-{at.integer(setting, key, 0, 1)}"
     return joints
-
-
-def _joint_axis(at: SourceLine, heading: str, axes: str) -> str:
-    section = _SECTION.fullmatch(heading)
-    if section is None:
-        return ""
-    if int(section[1]) >= len(axes):
-        at.refuse(f"section {heading}", f"a joint from 0 to {len(axes) - 1}, {axes}")
-    return axes[int(section[1])]
 
 
 def _rows(source: Source, per_unit: float, notes: list[str]) -> np.ndarray:
@@ -127,19 +109,24 @@ def _kind(rows: np.ndarray, stated: str) -> tuple[str, tuple[str, ...]]:
 
 
 def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
-    joints, tables = _assignment(sources)
+    joints: dict[str, Joint] = {}
+    tables: list[Source] = []
+    for source in sources:
+        if re.search(r"^[ \t]*+COMP_FILE", source.text, re.MULTILINE):
+            joints |= _read_ini(source)
+        else:
+            tables.append(source)
     terms: list[AxisTable] = []
     inches = any(size != 1.0 for _, _, size in joints.values())
     assumed: list[str] = [f"machine units {'inches' if inches else 'mm'} and degrees"]
     notes: list[str] = []
     for source in tables:
         axis, kind, per_unit = joints.get(source.base, ("", "", 1.0))
-        if not axis:
-            letter = source.stem.upper().rsplit("_", 1)[-1]
-            axis = options.axis or (letter if len(letter) == 1 and letter in JOINTS else "")
-        if not axis:
-            source.refuse("does not state its axis", "--axis X, or its INI file")
-        axis = options.axis_named(axis, source)
+        axis = (
+            options.axis_named(axis, source)
+            if axis
+            else options.axis_of_file(source, "--axis X, or its INI file")
+        )
         if any(term.source == axis for term in terms):
             source.refuse(f"is a second table of {axis}", "one per joint, the limit of LinuxCNC")
         rows = _rows(source, per_unit, notes)
@@ -148,7 +135,7 @@ def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
         trims = rows[:, :1] - rows[:, 1:] if kind == POSITIONS else rows[:, 1:]
         nominal, forward, reverse = (tuple(column.tolist()) for column in (rows[:, 0], *trims.T))
         backward = () if forward == reverse else reverse
-        terms.append(AxisTable(axis, axis, nominal, forward, HOLD_ENDS, backward))
+        terms.append(AxisTable(axis, axis, nominal, forward, backward=backward))
     if not terms:
         sources[0].refuse("names files", "the files of its COMP_FILE lines with it")
     return Tables(tuple(terms), tuple(dict.fromkeys(assumed)), tuple(notes))
@@ -222,18 +209,13 @@ def _write_matrix(corrections: RequiredCorrections) -> Files:
     return {"": "\n".join(lines) + "\n"}
 
 
-COMP = Format(
-    **describe("linuxcnc-comp"),
-    recognise=_is_comp,
-    tables=_read_comp,
-    write=_write_comp,
-    most_points=MAX_ROWS,
-    variants=(POSITIONS, OFFSETS),
-)
-MATRIX = Format(
-    **describe("linuxcnc-matrix"),
-    recognise=has_pattern(r"matrixkins\.C_"),
-    tables=_read_matrix,
-    write=_write_matrix,
-)
-FORMATS = (COMP, MATRIX)
+FORMATS = (
+    Format(
+        **describe("linuxcnc-comp"), recognise=_is_comp, tables=_read_comp, write=_write_comp,
+        most_points=MAX_ROWS, variants=(POSITIONS, OFFSETS),
+    ),
+    Format(
+        **describe("linuxcnc-matrix"), recognise=has_pattern(r"matrixkins\.C_"),
+        tables=_read_matrix, write=_write_matrix,
+    ),
+)  # fmt: skip

@@ -10,15 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from warpspace.formats.measured import (
-    BACKWARD,
-    FORWARD,
-    ErrorSeries,
-    ImportedErrors,
-    MeasuredRun,
-    errors_of_readings,
-    merge,
-)
+from warpspace.formats import measured
 from warpspace.formats.registry import Format, ReadOptions, describe, has_pattern
 from warpspace.formats.source import Source, SourceLine
 from warpspace.machine.axes import is_linear
@@ -94,17 +86,6 @@ def _targets(source: Source, lines: Lines) -> tuple[list[float], list[int]]:
     return values, flags
 
 
-def _axis(source: Source, sections: dict[str, Lines], options: ReadOptions) -> str:
-    if options.axis:
-        return options.axis_named(options.axis, source)
-    pairs = [(at, _pair(text)) for at, text in sections.get("USER-TEXT", [])]
-    named = [(at, pair[1]) for at, pair in pairs if pair and pair[0] == "axis" and pair[1]]
-    if not named:
-        source.refuse("does not state its axis", "--axis X")
-    at, value = named[0]
-    return options.axis_named(value.split()[0], at)
-
-
 def _run_count(source: Source, lines: Lines) -> int:
     stated = 0
     for at, text in lines:
@@ -140,12 +121,20 @@ def _deviations(lines: Lines, targets: int, stated: int) -> dict[int, np.ndarray
     return table
 
 
-def _read_one(source: Source, options: ReadOptions) -> ImportedErrors:
+def _read_one(source: Source, options: ReadOptions) -> measured.ImportedErrors:
     sections = _sections(source)
     targets, flags = _targets(source, sections["TARGET DATA"])
     stated = _run_count(source, sections["RUNS"])
     unidirectional = len(flags) > 1 and flags[1] == 1
-    axis = _axis(source, sections, options)
+    if options.axis:
+        axis = options.axis_named(options.axis, source)
+    else:
+        pairs = [(at, _pair(text)) for at, text in sections.get("USER-TEXT", [])]
+        named = [(at, pair[1]) for at, pair in pairs if pair and pair[0] == "axis" and pair[1]]
+        if not named:
+            source.refuse("does not state its axis", "--axis X")
+        at, value = named[0]
+        axis = options.axis_named(value.split()[0], at)
     table = _deviations(sections["DEVIATIONS"], len(targets), stated)
     rows_by_run = {run: row for run, row in sorted(table.items()) if run % 2 or not unidirectional}
     expected = [run for run in range(1, stated + 1) if run % 2 or not unidirectional]
@@ -155,24 +144,30 @@ def _read_one(source: Source, options: ReadOptions) -> ImportedErrors:
         source.refuse(f"{counted} readings", f"{required} (is the file truncated?)")
     order = np.argsort(targets)
     runs = tuple(
-        MeasuredRun((run + 1) // 2, FORWARD if run % 2 else BACKWARD, tuple(row[order].tolist()))
+        measured.MeasuredRun(
+            (run + 1) // 2,
+            measured.FORWARD if run % 2 else measured.BACKWARD,
+            tuple(row[order].tolist()),
+        )
         for run, row in rows_by_run.items()
     )
     if not is_linear(axis):
         source.refuse(f"is for the rotary axis {axis}, whose units are unknown; expected a CSV")
     key = f"E{'XYZ'['XYZUVW'.index(axis[0]) % 3]}{axis}"
-    series = ErrorSeries(key, tuple(float(targets[index]) for index in order), runs)
+    series = measured.ErrorSeries(key, tuple(float(targets[index]) for index in order), runs)
     air = [text for _, text in sections.get("ENVIRONMENT", [])]
     notes = source.notes
     if air:
         notes += (f"environment: {'; '.join(air)}",)
     assumed = (INFERRED, ONE_WAY) if unidirectional else (INFERRED,)
-    return ImportedErrors(NAME, (series,), units=("mm", "µm"), assumed=assumed, notes=notes)
+    return measured.ImportedErrors(
+        NAME, (series,), units=("mm", "µm"), assumed=assumed, notes=notes
+    )
 
 
-def read(sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
-    readings = merge([_read_one(source, options) for source in sources])
-    return errors_of_readings(readings, options.machine)
+def read(sources: Sequence[Source], options: ReadOptions) -> measured.ImportedErrors:
+    readings = measured.merge([_read_one(source, options) for source in sources])
+    return measured.errors_of_readings(readings, options.machine)
 
 
 FORMATS = (

@@ -15,7 +15,6 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from warpspace.field.grid import shares
 from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, describe, has_pattern
 from warpspace.formats.source import Source, SourceLine, format_comment, format_number, quote
-from warpspace.formats.terms import HOLD_ENDS, MODULO, AxisTable, Product, Tables, Term
+from warpspace.formats.terms import AxisTable, Product, Tables, Term
 from warpspace.machine.axes import TravelDirection
 from warpspace.units import Array
 
@@ -48,6 +47,12 @@ MIN_PRODUCT_MM = 1e-5  # smaller products of tables are omitted
 MIN_TABLE_MM = 1e-7  # smaller tables are omitted
 SWITCHES = {DIRECTION: (-1, 1), FACTOR: (0, MAX_TABLES), IS_MODULO: (0, 1)}
 """Integer settings of a table, with their limits."""
+SETTINGS = {ENC: (*RANGE, IS_MODULO), CEC: (*AXES, *RANGE, *SWITCHES)}
+INDICES = {
+    ENC: ("[encoder, point, axis]", "[encoder, axis]"),
+    CEC: ("[table, point]", "[table]"),
+}
+"""Indices of a value and of a setting."""
 CorrectionsByAxes = Mapping[tuple[str, ...], Array]
 """Corrections by the corrected axis and the axes that they depend on."""
 _ASSIGNMENT = re.compile(r"\$([A-Z_]+)\s*\[([^\]]*)\]\s*=\s*(.+)")
@@ -94,7 +99,7 @@ class AssignmentTable:
             *axes,
             tuple((start + step * np.arange(last + 1, dtype=np.float64)).tolist()),
             tuple(factor * self.values[index] for index in range(last + 1)),
-            MODULO if self.switches.get(IS_MODULO) else HOLD_ENDS,
+            is_modulo=bool(self.switches.get(IS_MODULO)),
             direction=self.switches.get("DIRECTION", 0),
         )
 
@@ -103,11 +108,9 @@ def _assigns(name: str) -> Callable[[str, str], bool]:
     return has_pattern(rf"^\s*(?:N\d+\s+)?\${name}[A-Z_]*\s*\[")
 
 
-def _assignments(
-    source: Source, prefix: str, settings: Sequence[str], indices: tuple[str, str]
-) -> Iterator[tuple[SourceLine, str, list[str], str]]:
+def _assignments(source: Source, prefix: str) -> Iterator[tuple[SourceLine, str, list[str], str]]:
     """Yield line, setting (empty for a value), indices and value of each assignment."""
-    names = (prefix, *(f"{prefix}_{setting}" for setting in settings))
+    names = (prefix, *(f"{prefix}_{setting}" for setting in SETTINGS[prefix]))
     is_empty = True
     for at, text in source.scan(";"):
         bare = re.sub(r"^N\d+\s+", "", text)
@@ -120,7 +123,7 @@ def _assignments(
         if name not in names:
             at.refuse(f"variable ${name}", f"one of {', '.join(f'${known}' for known in names)}")
         parts = [part.strip() for part in re.split(r"[,.]", inner)]
-        expected = indices[name != prefix]
+        expected = INDICES[prefix][name != prefix]
         if len(parts) != expected.count(",") + 1:
             at.refuse(f"${name}[{', '.join(parts)}]", expected)
         is_empty = False
@@ -159,17 +162,15 @@ def _archive(name: str, corrections: RequiredCorrections, sign: str, body: Seque
     return {"": "\n".join([*head, *body, "M17"]) + "\n"}
 
 
-def _read(
-    source: Source,
-    prefix: str,
-    indices: tuple[str, str],
-    key_of: Callable[[list[str], SourceLine], tuple[Any, str]],
-    settings: Sequence[str] = (*RANGE, IS_MODULO),
-) -> dict[Any, AssignmentTable]:
-    tables: dict[Any, AssignmentTable] = {}
-    for at, setting, parts, text in _assignments(source, prefix, settings, indices):
+def _read(source: Source, prefix: str) -> dict[tuple[int, str], AssignmentTable]:
+    """Read the tables of a variable by the first index and, of encoders, the axis."""
+    tables: dict[tuple[int, str], AssignmentTable] = {}
+    for at, setting, parts, text in _assignments(source, prefix):
         name = f"${prefix}_{setting}" if setting else f"${prefix}"
-        key, label = key_of(parts, at)
+        number = _index(parts[0], at)
+        if prefix == CEC and number >= MAX_TABLES:
+            at.refuse(f"table {number}", f"at most {MAX_TABLES - 1}")
+        key = number, _axis_name(parts[-1], at) if prefix == ENC else ""
         table = tables.setdefault(key, AssignmentTable(at))
         if setting in AXES:
             table.axes[setting] = _axis_name(text, at)
@@ -180,6 +181,7 @@ def _read(
         else:
             index = _index(parts[1], at)
             if index in table.values:
+                label = f"${ENC}" if prefix == ENC else f"table {number}"
                 at.refuse(f"{label}: interpolation point {index} is repeated", "it once")
             table.values[index] = at.number(text, name)
     return tables
@@ -188,13 +190,8 @@ def _read(
 def _read_enc(sources: Sequence[Source], options: ReadOptions) -> Tables:
     terms: list[AxisTable] = []
     notes: list[str] = []
-
-    def key_of(parts: list[str], at: SourceLine) -> tuple[tuple[int, str], str]:
-        return (_index(parts[0], at), _axis_name(parts[-1], at)), f"${ENC}"
-
     for source in sources:
-        indices = ("[encoder, point, axis]", "[encoder, axis]")
-        for (encoder, name), table in _read(source, ENC, indices, key_of).items():
+        for (encoder, name), table in _read(source, ENC).items():
             axis = options.axis_named(name, table.at)
             label = f"table of {name}"
             if any(term.source == axis for term in terms):
@@ -224,17 +221,9 @@ def _write_enc(corrections: RequiredCorrections) -> Files:
 def _read_cec(sources: Sequence[Source], options: ReadOptions) -> Tables:
     terms: list[Term] = []
     factor = options.factor(ERROR)
-
-    def key_of(parts: list[str], at: SourceLine) -> tuple[int, str]:
-        index = _index(parts[0], at)
-        if index >= MAX_TABLES:
-            at.refuse(f"table {index}", f"at most {MAX_TABLES - 1}")
-        return index, f"table {index}"
-
     for source in sources:
-        settings = (*AXES, *RANGE, *SWITCHES)
-        tables = _read(source, CEC, ("[table, point]", "[table]"), key_of, settings)
-        lines = {}
+        tables = {index: table for (index, _), table in _read(source, CEC).items()}
+        lines: dict[int, AxisTable] = {}
         for index, table in tables.items():
             label = f"table {index}"
             for setting in AXES:
@@ -315,17 +304,13 @@ def _half_reversals(corrections: RequiredCorrections, axis: str) -> CorrectionsB
     forward = base.for_direction(TravelDirection.FORWARD, axis)
     backward = base.for_direction(TravelDirection.BACKWARD, axis)
     halves: dict[tuple[str, ...], Array] = {}
-    for other in ("", *corrections.axes):
-        if other == axis:
-            continue
-        group = tuple(name for name in corrections.axes if name in (axis, other))
+    others = (other for other in corrections.axes if other != axis)
+    for pair in ((axis,), *((axis, other) for other in others)):
+        group = tuple(name for name in corrections.axes if name in pair)
         opposite = backward.averaged(group)
         for target, moves in forward.averaged(group).items():
             half = (moves - opposite[target]) / 2.0
-            if not other:
-                halves[target, axis] = half
-            else:
-                halves[target, axis, other] = half if group[0] == axis else half.T
+            halves[target, *pair] = half if group == pair else half.T
     return halves
 
 
@@ -364,13 +349,11 @@ def _tables_for(
     axis_tables: list[CrossTable] = []
     for axis, moves in along.items():
         reversal = half.get(axis, np.zeros(()))
-        if np.abs(reversal).max() > MIN_TABLE_MM:
-            axis_tables += [
-                CrossTable(axis, target, factor * (moves + direction * reversal), direction)
-                for direction in (1, -1)
-            ]
-        else:
-            axis_tables.append(CrossTable(axis, target, factor * moves))
+        is_directed = np.abs(reversal).max() > MIN_TABLE_MM
+        axis_tables += [
+            CrossTable(axis, target, factor * (moves + direction * reversal), direction)
+            for direction in ((1, -1) if is_directed else (0,))
+        ]
     effective = [table for table in axis_tables if np.abs(table.values).max() > MIN_TABLE_MM]
     return [*effective, *products]
 

@@ -35,28 +35,13 @@ SIDE_MM = 100.0  # side of the part whose lengths express a factor
 def skew_factor(ac: float, bd: float, ad: float) -> float:
     """Compute the skew factor of a part from its lengths, mm."""
     side = other_side(ac, bd, ad)
-    return math.tan(
-        math.pi / 2.0 - math.acos((ac * ac - side * side - ad * ad) / (2.0 * side * ad))
-    )
+    cosine = (ac * ac - side * side - ad * ad) / (2.0 * side * ad)
+    return math.tan(math.pi / 2.0 - math.acos(cosine))
 
 
 def other_side(ac: float, bd: float, ad: float) -> float:
     """Compute the side AB that closes a part, mm."""
     return math.sqrt(2.0 * ac * ac + 2.0 * bd * bd - 4.0 * ad * ad) / 2.0
-
-
-def closure_notes(lengths: tuple[float, float, float], plane: str) -> tuple[str, ...]:
-    """Return a note if the lengths of a part contradict a square part."""
-    ac, bd, ad = lengths
-    side = other_side(ac, bd, ad)
-    if abs(side / ad - 1.0) < CLOSURE_TOLERANCE:
-        return ()
-    share = 100.0 * (side / ad - 1.0)
-    note = (
-        f"{plane}: AC {ac:g}, BD {bd:g} and AD {ad:g} mm imply a side AB of {side:.4g} mm,"
-        f" {share:+.1f} % from AD; check the lengths (the part must be square)"
-    )
-    return (note,)
 
 
 def skew_lengths(factor: float) -> tuple[float, float, float]:
@@ -65,12 +50,22 @@ def skew_lengths(factor: float) -> tuple[float, float, float]:
     return 2.0 * SIDE_MM * math.cos(angle / 2.0), 2.0 * SIDE_MM * math.sin(angle / 2.0), SIDE_MM
 
 
-def factor_of(lengths: tuple[float, float, float], at: SourceLine, what: str) -> float:
+def factor_of_part(
+    lengths: tuple[float, float, float], at: SourceLine, plane: str, notes: list[str]
+) -> float:
+    """Compute the skew factor of a part; add a note if its lengths contradict a square part."""
     ac, bd, ad = lengths
     # twice a side is shorter than the sum of the diagonals, and longer than their difference
     if not (min(lengths) > 0.0 and ac + bd > 2.0 * ad > abs(ac - bd)):
-        problem = f"{what}: AC {ac:g}, BD {bd:g}, AD {ad:g} mm do not form a parallelogram"
+        problem = f"{plane}: AC {ac:g}, BD {bd:g}, AD {ad:g} mm do not form a parallelogram"
         at.refuse(problem, "two diagonals and a side")
+    side = other_side(ac, bd, ad)
+    if abs(side / ad - 1.0) >= CLOSURE_TOLERANCE:
+        notes.append(
+            f"{plane}: AC {ac:g}, BD {bd:g} and AD {ad:g} mm imply a side AB of {side:.4g} mm,"
+            f" {100.0 * (side / ad - 1.0):+.1f} % from AD; check the lengths (the part must be"
+            " square)"
+        )
     return skew_factor(ac, bd, ad)
 
 
@@ -144,8 +139,7 @@ def _set_skew(at: SourceLine, command: str, factors: dict[str, float], notes: li
         if len(parts) != 3:
             at.refuse(f"{plane}={value}", "three lengths AC,BD,AD in mm")
         ac, bd, ad = (at.number(part, plane) for part in parts)
-        factors[plane] = factor_of((ac, bd, ad), at, plane)
-        notes += closure_notes((ac, bd, ad), plane)
+        factors[plane] = factor_of_part((ac, bd, ad), at, plane, notes)
 
 
 def _loaded_profile(
@@ -199,9 +193,8 @@ def _twist(source: Source, options: ReadOptions) -> ImportedErrors | None:
     place, text = sections[probe]["y_offset"]
     offset = place.number(text, "y_offset")
     if abs(offset) < MIN_OFFSET_MM:
-        place.refuse(
-            f"y_offset {offset:g} mm", f"{MIN_OFFSET_MM:g} mm or more to compute the twist"
-        )
+        expected = f"{MIN_OFFSET_MM:g} mm or more to compute the twist"
+        place.refuse(f"y_offset {offset:g} mm", expected)
     options.axis_named("X", at)
     places = np.linspace(ends[0], ends[1], len(heights))
     series = ErrorSeries.undirected("EAX", places, np.array(heights) / offset * URAD_PER_RAD)
@@ -217,7 +210,8 @@ def _read_klipper(sources: Sequence[Source], options: ReadOptions) -> ImportedEr
     parts: list[ImportedErrors] = []
     for source in sources:
         twist = _twist(source, options)
-        parts += [twist] if twist else []
+        if twist:
+            parts.append(twist)
         if not twist or _factors(source, options, []):
             tables = _klipper_tables([source], options)
             parts.append(errors_from_tables(tables, "klipper", source, options.machine))
@@ -253,7 +247,14 @@ def _marlin_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     notes: list[str] = []
     for source in sources:
         switches = _read_marlin(source, factors, defined)
-        _check_switches(switches, defined, notes)
+        if defined and "SKEW_CORRECTION" not in switches:
+            at, _ = next(iter(next(iter(defined.values())).values()))
+            expected = "#define SKEW_CORRECTION, not commented out"
+            at.refuse("Marlin does not use these lengths", expected)
+        if "SKEW_CORRECTION_FOR_Z" not in switches:
+            for plane in [plane for plane in defined if plane != "XY"]:
+                del defined[plane]
+                notes.append(f"{plane}: ignored, SKEW_CORRECTION_FOR_Z is not defined")
         for plane, settings in defined.items():
             factors[plane] = _defined_factor(plane, settings, defined, notes)
         for plane, (at, factor) in factors.items():
@@ -286,18 +287,6 @@ def _read_marlin(source: Source, factors: Settings, defined: dict[str, Settings]
     return switches
 
 
-def _check_switches(switches: set[str], defined: dict[str, Settings], notes: list[str]) -> None:
-    """Check that Marlin uses the lengths, and drop those of planes that it ignores."""
-    if defined and "SKEW_CORRECTION" not in switches:
-        at, _ = next(iter(next(iter(defined.values())).values()))
-        at.refuse("Marlin does not use these lengths", "#define SKEW_CORRECTION, not commented out")
-    if "SKEW_CORRECTION_FOR_Z" in switches:
-        return
-    for plane in [plane for plane in defined if plane != "XY"]:
-        del defined[plane]
-        notes.append(f"{plane}: ignored, SKEW_CORRECTION_FOR_Z is not defined")
-
-
 def _defined_factor(
     plane: str, settings: Settings, defined: Mapping[str, Settings], notes: list[str]
 ) -> tuple[SourceLine, float]:
@@ -311,9 +300,7 @@ def _defined_factor(
         at.refuse(f"{plane}: {', '.join(settings)}", f"{plane}_DIAG_AC, {plane}_DIAG_BD and a side")
     at, ac = settings["DIAG_AC"]
     lengths = (ac, settings["DIAG_BD"][1], side[1])
-    factor = factor_of(lengths, at, plane)
-    notes += closure_notes(lengths, plane)
-    return at, factor
+    return at, factor_of_part(lengths, at, plane, notes)
 
 
 def _write_marlin(corrections: RequiredCorrections) -> Files:
@@ -322,12 +309,9 @@ def _write_marlin(corrections: RequiredCorrections) -> Files:
         f"{letter}{format_number(float(corrections.round(factors[plane])), DIGITS)}"
         for letter, plane in zip("IJK", PLANES, strict=True)
     ]
-    lines = [
-        format_comment("; ", corrections.scene.title),
-        "; SKEW_CORRECTION_FOR_Z and SKEW_CORRECTION_GCODE must be enabled",
-        f"M852 {' '.join(parameters)}\n",
-    ]
-    return {"": "\n".join(lines)}
+    head = format_comment("; ", corrections.scene.title)
+    head += "\n; SKEW_CORRECTION_FOR_Z and SKEW_CORRECTION_GCODE must be enabled\n"
+    return {"": f"{head}M852 {' '.join(parameters)}\n"}
 
 
 KLIPPER = Format(

@@ -13,9 +13,8 @@ by #; columns part by blanks; two arguments make an error of two axes. Etalon ex
 
 import math
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,7 +23,13 @@ from warpspace.formats import measured
 from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.registry import Files, Format, ReadOptions, describe
 from warpspace.formats.source import Source, SourceLine, format_comment, format_number
-from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
+from warpspace.machine.axes import (
+    PARAMETERS,
+    TravelDirection,
+    direction_index,
+    is_linear,
+    parameter,
+)
 from warpspace.machine.limits import MAX_POINTS
 from warpspace.units import UM_PER_MM, URAD_PER_RAD
 
@@ -49,10 +54,7 @@ FINE_DEG = 1.0  # step of a table to which a harmonic is added
 def error_name(name: str) -> str:
     """Return the key of a parameter of a file; empty if it is not an error."""
     upper = name.strip().upper()
-    for key in (upper, f"E{upper}"):
-        if key in PARAMETERS:
-            return key
-    return ""
+    return next((key for key in (upper, f"E{upper}") if key in PARAMETERS), "")
 
 
 def file_name(key: str) -> str:
@@ -69,10 +71,23 @@ def ignored_notes(names: Sequence[str]) -> tuple[str, ...]:
     return (f"ignored {', '.join(names)}: not errors",) if names else ()
 
 
-def check_axes(imported: measured.ImportedErrors, name: str) -> None:
+def _errors_to_write(corrections: RequiredCorrections, name: str) -> measured.ImportedErrors:
+    """Compute the errors of a scene for its direction of travel."""
+    imported = measured.sample_errors(corrections)
     other = next((axis for axis in imported.axes if axis not in ARGUMENTS), "")
     if other:
         raise OptionError(f"{name} cannot represent axis {other}; expected {', '.join(ARGUMENTS)}")
+    travel = TravelDirection(corrections.scene.model.direction)
+    direction = measured.RUN_DIRECTION.get(travel, measured.UNDIRECTED)
+    series = [
+        measured.ErrorSeries.undirected(error.key, error.positions, error.in_direction(direction))
+        for error in imported.series
+    ]
+    surfaces = [
+        replace(error, values=tuple(map(tuple, error.table(direction).tolist())), backward=())
+        for error in imported.surfaces
+    ]
+    return replace(imported, series=tuple(series), surfaces=tuple(surfaces))
 
 
 def _finished(imported: measured.ImportedErrors, options: ReadOptions) -> measured.ImportedErrors:
@@ -149,34 +164,26 @@ def _read_with(
 
 
 ISG = "isg-csv"
-_SPLIT = re.compile(r"[\s;,]+")
+_FIELD = re.compile(r"[^\s;,]+")
 Block = list[tuple[SourceLine, list[str]]]
-Row = tuple[SourceLine, dict[str, float]]
 
 
-def _is_isg(head: str, name: str) -> bool:
-    del name
-    for text in head.splitlines():
-        bare = text.split("//")[0].strip()
-        if not bare or bare == "#":
-            continue
-        names = [part for part in _SPLIT.split(bare) if part]
-        parameters = [part for part in names if error_name(part)]
-        return bool(parameters) and len(parameters) + sum(
-            part in ARGUMENTS for part in names
-        ) == len(names)
-    return False
+def _is_isg(head: str, _name: str) -> bool:
+    rows = (text.split("//")[0].strip() for text in head.splitlines())
+    names = _FIELD.findall(next((row for row in rows if row not in ("", "#")), ""))
+    return any(map(error_name, names)) and all(
+        name in ARGUMENTS or error_name(name) for name in names
+    )
 
 
 def _blocks(source: Source) -> list[Block]:
     blocks: list[Block] = [[]]
     for at, text in source.scan("//"):
-        bare = text
-        if bare.startswith("#"):
+        if text.startswith("#"):
             blocks.append([])
-            bare = bare[1:].strip()
-        if bare:
-            blocks[-1].append((at, [part for part in _SPLIT.split(bare) if part]))
+        fields = _FIELD.findall(text.removeprefix("#"))
+        if fields:
+            blocks[-1].append((at, fields))
             if len(blocks[-1]) > MAX_POINTS:
                 at.refuse(f"a block has more than {MAX_POINTS:,} rows", "shorter blocks")
     return [block for block in blocks if block]
@@ -204,21 +211,34 @@ def _read_block(source: Source, block: Block) -> measured.ImportedErrors:
     _check_header(at, names, arguments, ignored)
     if len(block) < 2:
         at.refuse("a header without records", "at least one")
-    rows = [_read_record(place, names, parts) for place, parts in block[1:]]
+    lines = [line for line, _ in block[1:]]
+    rows = [_read_record(line, names, parts) for line, parts in block[1:]]
     notes = (*source.notes, *ignored_notes(ignored))
     keys = [key for key in map(error_name, names) if key]
     if not arguments and len(rows) > 1:
-        rows[1][0].refuse(f"{len(rows)} records without arguments", "one")
+        lines[1].refuse(f"{len(rows)} records without arguments", "one")
     for key in keys:
         _check_arguments(at, key, arguments)
     if not arguments:
-        constants = {key: rows[0][1][key] for key in keys}
+        constants = {key: rows[0][key] for key in keys}
         return measured.ImportedErrors(ISG, constants=constants, notes=notes)
-    if len(arguments) == 2:
-        surfaces = tuple(_isg_surface(source, key, arguments, rows) for key in keys)
-        return measured.ImportedErrors(ISG, surfaces=surfaces, notes=notes)
-    series = tuple(_isg_series(key, arguments[0], rows) for key in keys)
-    return measured.ImportedErrors(ISG, series, notes=notes)
+    series: list[measured.ErrorSeries] = []
+    surfaces: list[measured.ErrorSurface] = []
+    for key in keys:
+        axis = parameter(key).axis
+        if len(arguments) == 2:
+            (other,) = {*arguments} - {axis}
+            points = [
+                (line, row[axis], row[other], row[key])
+                for line, row in zip(lines, rows, strict=True)
+            ]
+            surfaces.append(measured.build_surface(key, (axis, other), points, source))
+            continue
+        along = [row[axis] for row in rows]
+        for line, before, position in zip(lines[1:], along[:-1], along[1:], strict=True):
+            line.ascending(position, before, axis)
+        series.append(measured.ErrorSeries.undirected(key, along, [row[key] for row in rows]))
+    return measured.ImportedErrors(ISG, tuple(series), tuple(surfaces), notes=notes)
 
 
 def _check_header(
@@ -235,7 +255,7 @@ def _check_header(
         at.refuse(f"{len(arguments)} arguments {' '.join(arguments)}", expected)
 
 
-def _read_record(at: SourceLine, names: Sequence[str], parts: Sequence[str]) -> Row:
+def _read_record(at: SourceLine, names: Sequence[str], parts: Sequence[str]) -> dict[str, float]:
     if len(parts) != len(names):
         at.refuse(f"{len(parts)} fields", f"{len(names)} as in the header")
     row: dict[str, float] = {}
@@ -245,7 +265,7 @@ def _read_record(at: SourceLine, names: Sequence[str], parts: Sequence[str]) -> 
             row[name] = at.checked_position(number, name)
         elif key:
             row[key] = at.checked_error(number * factor_of(key), name)
-    return at, row
+    return row
 
 
 def _check_arguments(at: SourceLine, key: str, arguments: Sequence[str]) -> None:
@@ -259,27 +279,8 @@ def _check_arguments(at: SourceLine, key: str, arguments: Sequence[str]) -> None
         at.refuse(f"{key} over {' and '.join(arguments)}", f"the argument {row.axis}")
 
 
-def _isg_series(key: str, argument: str, rows: Sequence[Row]) -> measured.ErrorSeries:
-    for (_, before), (at, row) in pairwise(rows):
-        if row[argument] <= before[argument]:
-            problem = f"{argument} {row[argument]:g} after {before[argument]:g}"
-            at.refuse(problem, "ascending positions")
-    positions, errors = [row[argument] for _, row in rows], [row[key] for _, row in rows]
-    return measured.ErrorSeries.undirected(key, positions, errors)
-
-
-def _isg_surface(
-    source: Source, key: str, arguments: Sequence[str], rows: Sequence[Row]
-) -> measured.ErrorSurface:
-    first = parameter(key).axis
-    second = next(axis for axis in arguments if axis != first)
-    points = [(at, row[first], row[second], row[key]) for at, row in rows]
-    return measured.build_surface(key, (first, second), points, source)
-
-
 def _write_isg(corrections: RequiredCorrections) -> Files:
-    imported = measured.to_single_direction(measured.sample_errors(corrections), corrections)
-    check_axes(imported, ISG)
+    imported = _errors_to_write(corrections, ISG)
 
     def format_error(error: float, key: str) -> str:
         return format_number(error / factor_of(key), DIGITS)
@@ -297,11 +298,8 @@ def _write_isg(corrections: RequiredCorrections) -> Files:
         key = measured.zero_key(corrections.scene)
         blocks = [[[parameter(key).axis, key], ["0.0", "0.0"]]]
     texts = ["\n".join("\t".join(row) for row in block) for block in blocks]
-    return {
-        "": f"{format_comment('// ', corrections.scene.title)}\n// mm, rad, degrees\n"
-        + "\n#\n".join(texts)
-        + "\n"
-    }
+    head = format_comment("// ", corrections.scene.title)
+    return {"": f"{head}\n// mm, rad, degrees\n" + "\n#\n".join(texts) + "\n"}
 
 
 ISO = "iso-text"
@@ -310,98 +308,77 @@ _VALUE = re.compile(r"VALUE\s*=\s*(\S+)", re.IGNORECASE)
 _OPEN = re.compile(r"Gridpoints\s*=\s*\{?", re.IGNORECASE)
 
 
-def _is_iso(head: str, name: str) -> bool:
-    del name
-    blocks = [error for error in _SECTION.findall(head) if error_name(error)]
-    return bool(blocks) and bool(re.search(r"Gridpoints|VALUE\s*=", head, re.IGNORECASE))
-
-
-@dataclass
-class _IsoReader:
-    """State while a text with ISO names is read: its errors and the current block."""
-
-    constants: dict[str, float] = field(default_factory=dict[str, float])
-    series: dict[str, measured.ErrorSeries] = field(default_factory=dict[str, measured.ErrorSeries])
-    ignored: list[str] = field(default_factory=list[str])
-    name: str = ""  # of the current block
-    key: str = ""  # its error parameter; empty where the block is ignored
-    opened: SourceLine | None = None  # where its grid points begin, until they end
-    points: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
-
-    def read_line(self, at: SourceLine, bare: str) -> None:
-        section, constant = _SECTION.fullmatch(bare), _VALUE.fullmatch(bare)
-        if self.opened:
-            self._read_point(at, bare)
-        elif section:
-            self._begin_block(at, section[1].upper())
-        elif not self.name:
-            at.refuse(at.quoted, "a block such as [EXY]")
-        elif constant:
-            self._read_constant(at, constant[1])
-        elif _OPEN.fullmatch(bare):
-            if self.key and parameter(self.key).is_constant:
-                at.refuse(f"[{self.name}] has Gridpoints", "VALUE = number")
-            self.opened = at
-        elif bare != "{":
-            at.refuse(at.quoted, "VALUE = number or Gridpoints = {")
-
-    def _begin_block(self, at: SourceLine, name: str) -> None:
-        self.name, self.key = name, error_name(name)
-        if self.key in self.constants or self.key in self.series:
-            at.refuse(f"[{name}] occurs twice", "it once")
-        if not self.key and not IGNORED.fullmatch(name):
-            at.refuse(f"[{name}]", "a parameter such as EXY or C0B")
-        if not self.key:
-            self.ignored.append(name)
-
-    def _read_constant(self, at: SourceLine, text: str) -> None:
-        number = at.number(text, f"VALUE of {self.name}")
-        if self.key and not parameter(self.key).is_constant:
-            at.refuse(f"[{self.name}] has one VALUE", "Gridpoints = { position value … }")
-        if self.key:
-            self.constants[self.key] = at.checked_error(number * factor_of(self.key), self.name)
-
-    def _read_point(self, at: SourceLine, bare: str) -> None:
-        body, closed, _ = bare.partition("}")
-        parts = body.replace("{", " ").split()
-        if parts:
-            self.points.append(self._point(at, parts))
-        if len(self.points) > MAX_POINTS:
-            at.refuse(f"{self.name} has more than {MAX_POINTS:,} points", "fewer points")
-        if not closed:
-            return
-        if not self.points:
-            at.refuse(f"[{self.name}] has no points", "position and value")
-        if self.key:
-            positions, values = zip(*self.points, strict=True)
-            self.series[self.key] = measured.ErrorSeries.undirected(self.key, positions, values)
-        self.opened, self.points = None, []
-
-    def _point(self, at: SourceLine, parts: Sequence[str]) -> tuple[float, float]:
-        if len(parts) != 2:
-            at.refuse(f"{len(parts)} numbers in {at.quoted}", "position and value")
-        position = at.position(parts[0], "position")
-        if self.points and position <= self.points[-1][0]:
-            problem = f"position {position:g} of {self.name} after {self.points[-1][0]:g}"
-            at.refuse(problem, "ascending positions")
-        return position, at.error(parts[1], self.name, factor_of(self.key) if self.key else 1.0)
+def _is_iso(head: str, _name: str) -> bool:
+    has_errors = any(map(error_name, _SECTION.findall(head)))
+    return has_errors and bool(re.search(r"Gridpoints|VALUE\s*=", head, re.IGNORECASE))
 
 
 def _read_iso(source: Source) -> measured.ImportedErrors:
-    reader = _IsoReader()
-    for at, bare in source.scan("//"):
-        reader.read_line(at, bare)
-    if reader.opened:
-        problem = f"Gridpoints of [{reader.name}] do not end"
-        reader.opened.refuse(problem, "} (is the file truncated?)")
-    notes = (*source.notes, *ignored_notes(reader.ignored))
-    series = tuple(reader.series.values())
-    return measured.ImportedErrors(ISO, series, constants=reader.constants, notes=notes)
+    constants: dict[str, float] = {}
+    series: dict[str, measured.ErrorSeries] = {}
+    ignored: list[str] = []
+    name = key = ""  # of the block; an ignored one has no key
+    lines = source.scan("//")
+    for at, bare in lines:
+        section, constant = _SECTION.fullmatch(bare), _VALUE.fullmatch(bare)
+        if section:
+            name = section[1].upper()
+            key = error_name(name)
+            if key in constants or key in series:
+                at.refuse(f"[{name}] occurs twice", "it once")
+            if not key and not IGNORED.fullmatch(name):
+                at.refuse(f"[{name}]", "a parameter such as EXY or C0B")
+            if not key:
+                ignored.append(name)
+        elif not name:
+            at.refuse(at.quoted, "a block such as [EXY]")
+        elif constant:
+            number = at.number(constant[1], f"VALUE of {name}")
+            if key and not parameter(key).is_constant:
+                at.refuse(f"[{name}] has one VALUE", "Gridpoints = { position value … }")
+            if key:
+                constants[key] = at.checked_error(number * factor_of(key), name)
+        elif _OPEN.fullmatch(bare):
+            if key and parameter(key).is_constant:
+                at.refuse(f"[{name}] has Gridpoints", "VALUE = number")
+            positions, values = _grid_points(at, lines, name, factor_of(key) if key else 1.0)
+            if key:
+                series[key] = measured.ErrorSeries.undirected(key, positions, values)
+        elif bare != "{":
+            at.refuse(at.quoted, "VALUE = number or Gridpoints = {")
+    notes = (*source.notes, *ignored_notes(ignored))
+    return measured.ImportedErrors(ISO, tuple(series.values()), constants=constants, notes=notes)
+
+
+def _grid_points(
+    begin: SourceLine, lines: Iterator[tuple[SourceLine, str]], name: str, factor: float
+) -> tuple[list[float], list[float]]:
+    positions: list[float] = []
+    values: list[float] = []
+    for at, bare in lines:
+        body, closed, _ = bare.partition("}")
+        parts = body.replace("{", " ").split()
+        if parts:
+            if len(parts) != 2:
+                at.refuse(f"{len(parts)} numbers in {at.quoted}", "position and value")
+            position = at.position(parts[0], "position")
+            if positions:
+                at.ascending(position, positions[-1], "position", f" of {name}")
+            positions.append(position)
+            values.append(at.error(parts[1], name, factor))
+        if len(positions) > MAX_POINTS:
+            at.refuse(f"{name} has more than {MAX_POINTS:,} points", "fewer points")
+        if closed and not positions:
+            at.refuse(f"[{name}] has no points", "position and value")
+        if closed:
+            break
+    else:
+        begin.refuse(f"Gridpoints of [{name}] do not end", "} (is the file truncated?)")
+    return positions, values
 
 
 def _write_iso(corrections: RequiredCorrections) -> Files:
-    imported = measured.to_single_direction(measured.sample_errors(corrections), corrections)
-    check_axes(imported, ISO)
+    imported = _errors_to_write(corrections, ISO)
     lines = [format_comment("// ", corrections.scene.title), "// mm, rad, degrees; variant Vendor"]
     for surface in imported.surfaces:
         axes = " and ".join(surface.axes)
@@ -418,18 +395,13 @@ def _write_iso(corrections: RequiredCorrections) -> Files:
     return {"": "\n".join(lines) + "\n"}
 
 
-ISO_FORMAT = Format(
-    **describe(ISO),
-    recognise=_is_iso,
-    read=_read_with(lambda source: [_read_iso(source)]),
-    write=_write_iso,
-    variants=VARIANTS,
-)
-ISG_FORMAT = Format(
-    **describe(ISG),
-    recognise=_is_isg,
-    read=_read_with(_read_isg),
-    write=_write_isg,
-    variants=VARIANTS,
-)
-FORMATS = (ISO_FORMAT, ISG_FORMAT)
+FORMATS = (
+    Format(
+        **describe(ISO), recognise=_is_iso, read=_read_with(lambda source: [_read_iso(source)]),
+        write=_write_iso, variants=VARIANTS,
+    ),
+    Format(
+        **describe(ISG), recognise=_is_isg, read=_read_with(_read_isg), write=_write_isg,
+        variants=VARIANTS,
+    ),
+)  # fmt: skip

@@ -8,7 +8,7 @@ largest value (with its sign) of any other kind.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, ClassVar, Self, cast
@@ -43,20 +43,15 @@ def is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
+@dataclass
 class ValueReader:
     """Reader that checks raw values and collects findings."""
 
-    def __init__(
-        self,
-        csv_column: CsvColumn | None = None,
-        *,
-        axis: str = "",
-        axes: Collection[str] = (),
-        curve: ReadCurve | None = None,
-    ) -> None:
-        self.findings: list[Finding] = []
-        self.axis, self.axes = axis, tuple(axes)
-        self._csv_column, self._curve = csv_column, curve
+    csv_column: CsvColumn | None = None
+    axis: str = ""  # of the error
+    axes: Collection[str] = ()  # of the machine
+    nested: ReadCurve | None = None  # reader of nested curves
+    findings: list[Finding] = field(default_factory=list[Finding])
 
     def note(self, path: Path, text: str, value: object = ...) -> None:
         """Add a finding."""
@@ -163,20 +158,20 @@ class ValueReader:
 
     def curve(self, value: object, path: Path) -> "ErrorFunction | None":
         """Read a nested curve; None where problems were noted."""
-        if self._curve is None:
+        if self.nested is None:
             self.note(path, "expected a number", value)
             return None
-        return self._curve(value, path)
+        return self.nested(value, path)
 
     def csv_points(self, file: str, column: str) -> Points:
         """Read a column of a CSV file; empty after an earlier finding."""
         if self.findings:
             return ()
-        if self._csv_column is None:
+        if self.csv_column is None:
             self.note((), "CSV files are not read here; expected the values as { table = }")
             return ()
         try:
-            return self._csv_column(file, column)
+            return self.csv_column(file, column)
         except SceneError as error:
             for problem in error.problems:
                 self.note((), f"{error.source}: {problem}")
@@ -191,6 +186,8 @@ NEGLIGIBLE = 1e-12
 OWN_AXIS = "own"
 """Placeholder of the axis of the error among the arguments of a curve."""
 
+Coordinates = Mapping[str, Array]
+"""Axis to positions, [...], broadcastable: mm for linear axes, degrees for rotary ones."""
 Span = tuple[float, float]  # lower and upper end of an axis range, mm or degrees
 Rows = Sequence[Sequence[float]]  # numbers for editing, one row per line
 Spell = Callable[[float], str]  # formats one number
@@ -205,10 +202,12 @@ class ErrorFunction(ABC):
     # keys of the tables that represent it in a scene file; empty where it is a number
     forms: ClassVar[tuple[tuple[str, ...], ...]]
     row_words: ClassVar[str]  # description of its rows
-    # description of the amplitude, with the fields {name} and {axis}
-    slider: ClassVar[str] = "{name} along {axis}; this is its largest value"
+    # description of the amplitude, with the fields {axis} and {curve}
+    slider: ClassVar[str] = "{curve.name} along {axis}; this is its largest value"
     # false where it comes from files only
     edited_as_rows: ClassVar[bool] = True
+    # true where it depends on the direction of travel
+    has_directions: ClassVar[bool] = False
     span: Span  # axis range of the curve, mm or degrees
 
     @abstractmethod
@@ -230,10 +229,7 @@ class ErrorFunction(ABC):
         return (OWN_AXIS,)
 
     def evaluate_at(
-        self,
-        axis: str,
-        coordinates: Mapping[str, Array],
-        direction: str = TravelDirection.MEAN,
+        self, axis: str, coordinates: Coordinates, direction: str = TravelDirection.MEAN
     ) -> Array:
         """Evaluate the error at axis positions reached in a direction of travel.
 
@@ -256,11 +252,6 @@ class ErrorFunction(ABC):
         return self.evaluate(coordinates[axis])
 
     @property
-    def has_directions(self) -> bool:
-        """True where it depends on the direction of travel."""
-        return False
-
-    @property
     def lines(self) -> tuple[tuple[str, "ErrorFunction"], ...]:
         """Curves along the axis of the error for a chart, each with its label."""
         return (("", self),)
@@ -280,14 +271,10 @@ class ErrorFunction(ABC):
         """Return the curve with all values multiplied by a factor."""
 
     @cached_property
-    def _peak(self) -> float:
-        values = self.evaluate(np.linspace(*self.span, self.samples))
-        return float(values[np.argmax(np.abs(values))])
-
-    @property
     def amplitude(self) -> float:
         """Largest value over the span, with its sign, µm or µrad."""
-        return self._peak
+        values = self.evaluate(np.linspace(*self.span, self.samples))
+        return float(values[np.argmax(np.abs(values))])
 
     @property
     def samples(self) -> int:
@@ -359,7 +346,7 @@ class ErrorFunction(ABC):
 
     def slider_words(self, axis: str) -> str:
         """Format the description of the amplitude for the slider."""
-        return self.slider.format(name=self.name, axis=axis)
+        return self.slider.format(axis=axis, curve=self)
 
     @classmethod
     def tidied(cls, rows: Rows) -> tuple[Rows, tuple[str, ...]]:
@@ -372,9 +359,9 @@ class ErrorFunction(ABC):
         del span, rows
         raise OptionError(cls.row_words)
 
-    @abstractmethod
     def rows(self) -> Rows:
         """Return the rows from which `from_rows` builds this curve."""
+        return ()
 
     @classmethod
     def from_curve(cls, present: "ErrorFunction", span: Span) -> Self:

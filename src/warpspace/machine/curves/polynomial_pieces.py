@@ -39,20 +39,18 @@ class Pieces(curve.ErrorFunction):
 
     @cached_property
     def _padded(self) -> Array:
-        padded = np.zeros((len(self.starts), DEGREE + 1))
-        for row, piece in zip(padded, self.coefficients, strict=True):
-            row[: len(piece)] = piece
-        return padded
+        rows = [np.pad(row, (0, DEGREE + 1 - len(row))) for row in self.coefficients]
+        return np.array(rows, dtype=float)
 
     def evaluate(self, position: Array) -> Array:
         starts = np.array(self.starts)
         clipped = np.clip(np.asarray(position, dtype=float), starts[0], self.end)
         piece = np.clip(np.searchsorted(starts, clipped, side="right") - 1, 0, len(starts) - 1)
-        along, coefficients = clipped - starts[piece], self._padded[piece]
-        value = np.zeros(along.shape)
-        for k in range(DEGREE, -1, -1):
-            value = value * along + coefficients[..., k]
-        return value
+        coefficients = np.moveaxis(self._padded[piece], -1, 0)
+        value = np.polynomial.polynomial.polyval(
+            clipped - starts[piece], coefficients, tensor=False
+        )
+        return np.asarray(value, dtype=float)
 
     def scaled(self, factor: float) -> Self:
         rows = tuple(tuple(factor * c for c in row) for row in self.coefficients)
@@ -104,9 +102,6 @@ class Pieces(curve.ErrorFunction):
         del unit, value, position
         return f"{len(self.starts)} pieces of polynomials"
 
-    def rows(self) -> curve.Rows:
-        return [(s, *row) for s, row in zip(self.starts, self.coefficients, strict=True)]
-
 
 def fit_curves(
     evaluate: Callable[[Array], Array], span: curve.Span, kinks: Array
@@ -145,9 +140,8 @@ def _fit(evaluate: Callable[[Array], Array], at: Array) -> tuple[Array, Array]:
         inside.transpose(1, 0, 2).reshape(DEGREE + 1, -1),
     )
     interpolated = np.tensordot(np.polynomial.chebyshev.chebvander(checks, DEGREE), series, axes=1)
-    deviation = np.abs(interpolated - beyond.transpose(1, 0, 2).reshape(len(checks), -1)).max(
-        axis=0
-    )
+    expected = beyond.transpose(1, 0, 2).reshape(len(checks), -1)
+    deviation = np.abs(interpolated - expected).max(axis=0)
     size = np.abs(values).max(axis=1).ravel()
     deviation = np.where(deviation > 2e-14 * size, deviation, 0.0)  # floating-point resolution
     powers = _power_matrix() @ series  # of (q − start) / width

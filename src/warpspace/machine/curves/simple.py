@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -12,6 +13,7 @@ from warpspace.machine import limits
 from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.curve import (
     SPAN_SAMPLES,
+    Coordinates,
     ErrorFunction,
     Rows,
     Span,
@@ -33,7 +35,7 @@ class OneNumber(ErrorFunction):
     def scaled(self, factor: float) -> Self:
         return replace(self, value=self.value * factor)
 
-    @property
+    @cached_property
     def amplitude(self) -> float:
         return self.value
 
@@ -298,6 +300,7 @@ class Directional(ErrorFunction):
     row_words = "curves by direction come from a scene file or an import"
     slider = "differs by direction of travel of {axis}; this is the larger one's amplitude"
     edited_as_rows = False
+    has_directions = True
     # towards increasing and decreasing positions; of any other kind
     forward: ErrorFunction = NOTHING
     backward: ErrorFunction = NOTHING
@@ -310,10 +313,7 @@ class Directional(ErrorFunction):
         return 0.5 * (self.forward.evaluate(position) + self.backward.evaluate(position))
 
     def evaluate_at(
-        self,
-        axis: str,
-        coordinates: Mapping[str, Array],
-        direction: str = TravelDirection.MEAN,
+        self, axis: str, coordinates: Coordinates, direction: str = TravelDirection.MEAN
     ) -> Array:
         """Evaluate the mean, one of the directions, or forward − backward, [...]."""
         forward, backward = SHARES[TravelDirection(direction)]
@@ -321,10 +321,6 @@ class Directional(ErrorFunction):
         return np.asarray(
             sum(share * curve.evaluate_at(axis, coordinates) for share, curve in weighted if share)
         )
-
-    @property
-    def has_directions(self) -> bool:
-        return True
 
     @property
     def lines(self) -> tuple[tuple[str, ErrorFunction], ...]:
@@ -345,7 +341,7 @@ class Directional(ErrorFunction):
     def scaled(self, factor: float) -> Self:
         return self._with_both(lambda curve: curve.scaled(factor))
 
-    @property
+    @cached_property
     def amplitude(self) -> float:
         forward, backward = self.forward.amplitude, self.backward.amplitude
         return backward if math.isnan(backward) or abs(backward) > abs(forward) else forward
@@ -388,9 +384,6 @@ class Directional(ErrorFunction):
             curve.describe(unit, value, position) for curve in (self.forward, self.backward)
         )
         return f"forward {forward}, backward {backward}"
-
-    def rows(self) -> Rows:
-        return [*self.forward.rows(), *self.backward.rows()]
 
     @classmethod
     def from_curve(cls, present: ErrorFunction, span: Span) -> Self:

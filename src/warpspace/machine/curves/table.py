@@ -14,6 +14,7 @@ from warpspace.exceptions import OptionError
 from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.curve import (
     MISSING,
+    Coordinates,
     ErrorFunction,
     Path,
     Rows,
@@ -33,7 +34,7 @@ MAX_DEPARTURE = 0.002
 """Largest deviation of a table from the curve it replaces, as a share of the peak."""
 BETWEEN = 8  # positions between two points at which the deviation is evaluated
 DIGITS = 6  # decimals of initial values, relative to the amplitude
-LIMITS = ((-MAX_LENGTH_MM, MAX_LENGTH_MM), (-MAX_ERROR, MAX_ERROR))  # of position and value
+POSITIONS, VALUES = (-MAX_LENGTH_MM, MAX_LENGTH_MM), (-MAX_ERROR, MAX_ERROR)  # limits
 SHOWN_POSITIONS = 3  # in a remark
 Point = tuple[float, float]
 
@@ -55,7 +56,7 @@ class TableCurve(ErrorFunction):
     def scaled(self, factor: float) -> Self:
         return replace(self, points=tuple((q, factor * value) for q, value in self.points))
 
-    @property
+    @cached_property
     def amplitude(self) -> float:
         return max((value for _, value in self.points), key=abs)
 
@@ -154,7 +155,9 @@ def _departure(curve: ErrorFunction, at: Array) -> float:
 def _points(raw: object, reader: ValueReader) -> tuple[Point, ...]:
     points: list[Point] = []
     for index, entry in enumerate(reader.entries(raw, ("table",), MAX_POINTS)):
-        position, value = reader.row(entry, ("table", index), "[position, value]", LIMITS)
+        position, value = reader.row(
+            entry, ("table", index), "[position, value]", (POSITIONS, VALUES)
+        )
         points.append((position, value))
     unsorted = None if reader.findings else _first_unsorted(points)
     if unsorted:
@@ -171,8 +174,6 @@ def _first_unsorted(points: Sequence[Point]) -> tuple[int, float, float] | None:
     return None
 
 
-POSITIONS = (-MAX_LENGTH_MM, MAX_LENGTH_MM)
-VALUES = (-MAX_ERROR, MAX_ERROR)
 FORM = "table2"
 Numbers = tuple[float, ...]
 Indices = NDArray[np.intp]
@@ -195,6 +196,7 @@ class TwoArguments(ErrorFunction):
     title = "table over two axes"
     forms = ((FORM,),)
     row_words = "a table over two axes comes from a scene file or an import"
+    slider = "varies with {axis} and {curve.axes[1]}; this is its largest value"
     edited_as_rows = False
     axes: tuple[str, str] = ("X", "Z")  # the axis of the error and the other one
     # (2, …); ascending positions of each, mm or degrees
@@ -222,10 +224,7 @@ class TwoArguments(ErrorFunction):
         return self._bilinear(along, np.asarray(self.middle))
 
     def evaluate_at(
-        self,
-        axis: str,
-        coordinates: Mapping[str, Array],
-        direction: str = TravelDirection.MEAN,
+        self, axis: str, coordinates: Coordinates, direction: str = TravelDirection.MEAN
     ) -> Array:
         """Interpolate between the positions of both axes, [...]."""
         del axis  # is the first of `axes`
@@ -264,7 +263,7 @@ class TwoArguments(ErrorFunction):
         rows = (factor * self._grid).tolist()
         return replace(self, values=tuple(map(tuple, rows)))
 
-    @property
+    @cached_property
     def amplitude(self) -> float:
         flat = self._grid.ravel()
         return float(flat[np.argmax(np.abs(flat))])
@@ -325,13 +324,6 @@ class TwoArguments(ErrorFunction):
         axis, other = self.axes
         sizes = " × ".join(str(len(at)) for at in self.positions)
         return f"table of {sizes} points over {axis} and {other}"
-
-    def slider_words(self, axis: str) -> str:
-        return f"varies with {axis} and {self.axes[1]}; this is its largest value"
-
-    def rows(self) -> Rows:
-        pairs = zip(self.positions[0], self.values, strict=True)
-        return [(position, *row) for position, row in pairs]
 
 
 def _cell(at: Numbers, position: Array) -> tuple[Indices, Indices, Array]:

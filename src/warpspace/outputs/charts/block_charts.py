@@ -4,6 +4,7 @@ from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
+from itertools import zip_longest
 from typing import Any, cast
 
 import matplotlib as mpl
@@ -16,7 +17,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import Bbox
 
-from warpspace.analysis.blocks import Bars, Curve, Histogram, Lines, Panel, Series
+from warpspace.analysis.blocks import Band, Bars, Curve, Histogram, Lines, Panel, Series
 from warpspace.bench.base import SMALLEST_DEVIATION, lay_polar
 from warpspace.outputs.drawing.settings import FONT, LIGHT, SAVE_RC, Theme
 
@@ -36,12 +37,7 @@ def on_ground(theme: Theme) -> Generator[None]:
         _THEME.reset(token)
 
 
-def ground() -> Theme:
-    return _THEME.get()
-
-
-def key_colour() -> str:
-    return ground().series[0]
+ground = _THEME.get
 
 
 def style() -> Any:
@@ -203,15 +199,14 @@ def legend_handles(bars: Bars) -> list[Patch | Line2D]:
 
 
 def _bars_per_row(panel: Panel) -> int:
-    bars = [one for one in panel.series if not one.as_mark]
-    rows = max((len(one.values) for one in bars), default=0)
-    counts = [sum(one.values[row] is not None for one in bars) for row in range(rows)]
-    return max(counts, default=1)
+    values = (one.values for one in panel.series if not one.as_mark)
+    rows = zip_longest(*values)
+    return max((sum(value is not None for value in row) for row in rows), default=1)
 
 
 def _bar_colour(role: str) -> str:
     plain = "#b4bfcc" if ground() is LIGHT else "#56616f"
-    return {"key": key_colour(), "set": ground().series[2]}.get(role, plain)
+    return {"key": ground().series[0], "set": ground().series[2]}.get(role, plain)
 
 
 def _longest(panel: Panel) -> float:
@@ -284,16 +279,11 @@ def draw_lines(figure: Figure, chart: Lines, box: Box, size: float = SMALL) -> N
     note = 0.2 / height if chart.note else 0.0
     figure.text(x_left + 0.3 / width, bottom + high - 0.05 / height, chart.title,
                 size=TEXT * size / SMALL, weight="bold", va="top")  # fmt: skip
-    inner = 0.75 if chart.kind != "polar" else 0.15
-    under = 0.5 if chart.kind != "polar" else 0.1
-    axes = figure.add_axes(
-        (
-            x_left + inner / width,
-            bottom + under / height + legend + note,
-            max(wide - (inner + 0.2) / width, 0.2 * wide),
-            max(high - (under + 0.35) / height - legend - note, 0.1 * high),
-        )
-    )
+    inner, under = (0.15, 0.1) if chart.kind == "polar" else (0.75, 0.5)
+    wide_inside = max(wide - (inner + 0.2) / width, 0.2 * wide)
+    high_inside = max(high - (under + 0.35) / height - legend - note, 0.1 * high)
+    low = bottom + under / height + legend + note
+    axes = figure.add_axes((x_left + inner / width, low, wide_inside, high_inside))
     if chart.kind == "polar":
         _polar(axes, chart)
     else:
@@ -308,8 +298,8 @@ def draw_lines(figure: Figure, chart: Lines, box: Box, size: float = SMALL) -> N
                 color=ground().muted)  # fmt: skip
 
 
-def _curve_colour(curve: Curve) -> str:
-    if curve.style == "thin":
+def _curve_colour(curve: Curve | Band) -> str:
+    if isinstance(curve, Curve) and curve.style == "thin":
         return ground().ghost
     return ground().series[curve.colour % len(ground().series)]
 
@@ -331,8 +321,8 @@ def _plot(axes: Axes, curve: Curve, x: "np.ndarray", y: "np.ndarray") -> None:
 def _lines(axes: Axes, chart: Lines, size: float) -> None:
     quiet(axes, "both")
     for band in chart.bands:
-        colour = ground().series[band.colour % len(ground().series)]
-        axes.fill_between(band.x, band.low, band.high, color=colour, alpha=0.16, linewidth=0.0)
+        look: dict[str, Any] = {"color": _curve_colour(band), "alpha": 0.16, "linewidth": 0.0}
+        axes.fill_between(band.x, band.low, band.high, **look)
     for curve in chart.curves:
         _plot(axes, curve, curve.x, curve.y)
     if chart.kind == "plane":
@@ -353,27 +343,25 @@ def _lines(axes: Axes, chart: Lines, size: float) -> None:
 
 def _polar(axes: Axes, chart: Lines) -> None:
     layout = lay_polar(chart)
-    axes.set_aspect("equal")
     axes.set_axis_off()
-    axes.set_xlim(-1.18, 1.18)
-    axes.set_ylim(-1.18, 1.18)
+    axes.set(aspect="equal", xlim=(-1.18, 1.18), ylim=(-1.18, 1.18))
     turn = np.linspace(0.0, 2.0 * np.pi, 361)
+    faint: dict[str, Any] = {"color": ground().faint, "linewidth": 0.8}
+    bold: dict[str, Any] = {"color": ground().ink, "linewidth": 1.0}
+    middle: dict[str, Any] = {"color": ground().muted, "ha": "center", "va": "center"}
     for value, radius in layout.rings:
-        colour = ground().ink if value == 0.0 else ground().faint
-        axes.plot(radius * np.cos(turn), radius * np.sin(turn), color=colour,
-                  linewidth=1.0 if value == 0.0 else 0.8)  # fmt: skip
+        look = faint if value != 0.0 else bold
+        axes.plot(radius * np.cos(turn), radius * np.sin(turn), **look)
         if value != 0.0:
-            axes.text(0.0, radius, f"{value:+g}", size=SMALL - 1.5, color=ground().muted,
-                      ha="center", va="center", bbox=_paper(0.4))  # fmt: skip
+            axes.text(0.0, radius, f"{value:+g}", size=SMALL - 1.5, bbox=_paper(0.4), **middle)
     for degrees in (0, 90, 180, 270):
         x, y = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
-        axes.plot([0.0, x], [0.0, y], color=ground().faint, linewidth=0.8)
-        axes.text(1.1 * x, 1.1 * y, f"{degrees}°", size=SMALL - 1.0, color=ground().muted,
-                  ha="center", va="center")  # fmt: skip
+        axes.plot([0.0, x], [0.0, y], **faint)
+        axes.text(1.1 * x, 1.1 * y, f"{degrees}°", size=SMALL - 1.0, **middle)
     for curve, points in zip(chart.curves, layout.curves, strict=True):
         _plot(axes, curve, points[:, 0], points[:, 1])
-    axes.text(-1.15, -1.15, f"rings {layout.ring:g} {layout.unit} apart", size=SMALL - 1.0,
-              color=ground().muted)  # fmt: skip
+    rings = f"rings {layout.ring:g} {layout.unit} apart"
+    axes.text(-1.15, -1.15, rings, size=SMALL - 1.0, color=ground().muted)
 
 
 def _handles(chart: Lines) -> list[Line2D | Patch]:
@@ -384,10 +372,8 @@ def _handles(chart: Lines) -> list[Line2D | Patch]:
         for curve in chart.curves
         if curve.name
     ]  # fmt: skip
-    colours = ground().series
     bands = [
-        Patch(facecolor=colours[band.colour % len(colours)], alpha=0.16, label=band.name)
-        for band in chart.bands
+        Patch(facecolor=_curve_colour(band), alpha=0.16, label=band.name) for band in chart.bands
     ]
     return [*lines, *bands]
 
@@ -417,19 +403,18 @@ def histogram_chart(histogram: Histogram) -> Figure:
         axes.set_xlim(0.0, max(last, 1.05 * (limit or 0.0), 1.05 * printed))
         axes.set_ylim(0.0, 1.06 * float(heights.max()))
         styles = {
-            "mean": (key_colour(), "-"), "P95": (ground().muted, "-"),
+            "mean": (ground().series[0], "-"), "P95": (ground().muted, "-"),
             "thesis": (ground().series[4], "--"), "limit": (ground().accent, "-"),
         }  # fmt: skip
         marks = [*histogram.marks, *([] if limit is None else [("limit", limit)])]
         _mark(axes, [(name, at, *styles.get(name, (ground().ink, "-"))) for name, at in marks])
-        large = 0.95, TEXT + 2.0, "bold", ground().ink
-        captions = (large, (0.83, SMALL, "normal", ground().muted))
-        styled = zip(histogram.captions, captions, strict=False)
-        for line, (height, size, weight, colour) in styled:
-            axes.text(
-                0.985, height, line, transform=axes.transAxes, ha="right", va="top", size=size,
-                weight=weight, color=colour, bbox=_paper(),
-            )  # fmt: skip
+        captions: tuple[tuple[float, dict[str, Any]], ...] = (
+            (0.95, {"size": TEXT + 2.0, "weight": "bold", "color": ground().ink}),
+            (0.83, {"size": SMALL, "weight": "normal", "color": ground().muted}),
+        )
+        corner: dict[str, Any] = {"transform": axes.transAxes, "ha": "right", "va": "top"}
+        for line, (height, look) in zip(histogram.captions, captions, strict=False):
+            axes.text(0.985, height, line, bbox=_paper(), **corner, **look)
         return figure
 
 

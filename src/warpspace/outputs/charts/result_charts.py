@@ -14,6 +14,7 @@ from matplotlib.patheffects import withStroke
 from warpspace.analysis.blocks import Bars, Histogram, Lines
 from warpspace.analysis.description import Result
 from warpspace.exceptions import OptionError
+from warpspace.machine.axes import is_linear
 from warpspace.outputs.charts.block_charts import (
     CHART_IN,
     DPI,
@@ -43,10 +44,11 @@ def result_chart(result: Result) -> Figure:
     """Draw the only bar chart of a result, or all its charts under its first lines."""
     blocks = list(result.blocks())
     charts = [block for block in blocks if isinstance(block, (Bars, Lines))]
+    histograms = [block for block in blocks if isinstance(block, Histogram)]
     if len(charts) == 1 and isinstance(charts[0], Bars):
         return bars_chart(charts[0])
-    for histogram in (block for block in blocks if isinstance(block, Histogram)):
-        return histogram_chart(histogram)
+    if histograms:
+        return histogram_chart(histograms[0])
     texts = [block.strip() for block in blocks if isinstance(block, str)]
     title, subtitle = [*texts, ""][:2]
     if not charts:
@@ -66,8 +68,8 @@ def bench_chart(result: "BenchResult", title: str | None = None) -> Figure:
     rows = -(-len(charts) // columns)
     numbers = NUMBERS_IN + VALUE_IN * (len(result.runs) - 1)
     quantities = (quantity for run in result.runs for quantity in run.outcome.quantities)
-    units = {quantity.key: (quantity.name, quantity.unit) for quantity in quantities}
-    names = dict(list(units.items())[:MOST_NUMBERS])
+    heads = {quantity.key: f"{quantity.name} [{quantity.unit}]" for quantity in quantities}
+    names = dict(list(heads.items())[:MOST_NUMBERS])
     # beside one chart, in the place of the fourth one, or below all
     below = 0.2 + LINE_IN * (len(names) + 1) + NOTE_IN * len(result.notes)
     below = 0.0 if len(charts) % 2 else below
@@ -88,25 +90,26 @@ def bench_chart(result: "BenchResult", title: str | None = None) -> Figure:
 def _numbers(
     figure: Figure,
     result: "BenchResult",
-    names: dict[str, tuple[str, str]],
+    names: dict[str, str],
     x_left: float,
     right: float,
     top: float,
 ) -> None:
     width, height = figure.get_size_inches()
     y = top - 0.15 / height
-    runs = result.runs
-    places = [right - VALUE_IN / width * (len(runs) - 1 - index) for index in range(len(runs))]
-    for run, place in zip(runs, places, strict=True):
-        figure.text(place, y, run.source, size=SMALL, color=ground().muted, ha="right")
-    for key, (name, unit) in names.items():
+    last, muted = len(result.runs) - 1, ground().muted
+    columns = [
+        (right - VALUE_IN / width * (last - index), run) for index, run in enumerate(result.runs)
+    ]
+    for place, run in columns:
+        figure.text(place, y, run.source, size=SMALL, color=muted, ha="right")
+    for key, name in names.items():
         rule = y - 0.07 / height
         line = Line2D([x_left, right], [rule, rule], color=ground().faint, linewidth=0.6)
         figure.add_artist(line)
         y -= LINE_IN / height
-        figure.text(x_left, y, f"{name} [{unit}]", size=SMALL, color=ground().muted,
-                    parse_math=False)  # fmt: skip
-        for run, place in zip(runs, places, strict=True):
+        figure.text(x_left, y, name, size=SMALL, color=muted, parse_math=False)
+        for place, run in columns:
             values = {one.key: round(one.value, 2) + 0.0 for one in run.outcome.quantities}
             text = f"{values[key]:.2f}".replace("-", "−") if key in values else "–"
             figure.text(place, y, text, size=TEXT, weight="bold", ha="right")
@@ -191,13 +194,13 @@ def _planes(compensation: "Compensation") -> list[tuple[int, int]]:
 def _fields(compensation: "Compensation") -> Sequence[tuple[str, "ErrorField", float]]:
     before, after = compensation.before, compensation.after
     largest, residual = (max(float(field.norm_um.max()), LEAST_UM) for field in (before, after))
-    before_text, after_text = (
+    texts = [
         f"mean {summary.mean_um:.2f}, max {summary.max_um:.2f} µm"
         for summary in (compensation.before_statistics, compensation.after_statistics)
-    )
+    ]
     return (
-        (f"before: {before_text}", before, largest),
-        (f"after, same colours: {after_text}", after, largest),
+        (f"before: {texts[0]}", before, largest),
+        (f"after, same colours: {texts[1]}", after, largest),
         ("residual error, own colour scale", after, residual),
     )
 
@@ -220,19 +223,18 @@ def _draw_slice(
         name = names[index]
         return np.ravel(grid.coordinates[name]) if name else np.zeros(1)
 
-    lines = [along(index) for index in plane]
     (x_left, right, half), (low, high, tall) = (
-        (line[0], line[-1], (line[-1] - line[0]) / (len(line) - 1) / 2.0) for line in lines
+        (line[0], line[-1], (line[-1] - line[0]) / (len(line) - 1) / 2.0)
+        for line in map(along, plane)
     )
     mesh = axes.imshow(
         values.T, origin="lower", extent=(x_left - half, right + half, low - tall, high + tall),
         aspect="auto", interpolation="bilinear", cmap="viridis", vmin=0.0, vmax=largest,
     )  # fmt: skip
-    axes.set_xlim(x_left, right)
-    axes.set_ylim(low, high)
-    labels = [f"{names[i]} [{'mm' if names[i][:1] in 'XYZUVW' else '°'}]" for i in plane]
-    axes.set_xlabel(labels[0], fontsize=SMALL)
-    axes.set_ylabel(labels[1], fontsize=SMALL)
+    axes.set(xlim=(x_left, right), ylim=(low, high))
+    x_label, y_label = (f"{names[i]} [{'mm' if is_linear(names[i]) else '°'}]" for i in plane)
+    axes.set_xlabel(x_label, fontsize=SMALL)
+    axes.set_ylabel(y_label, fontsize=SMALL)
     position = f"{names[normal]} {along(normal)[worst[normal]]:.4g}" if names[normal] else ""
     axes.text(
         0.02, 0.97, position.replace("-", "−"), transform=axes.transAxes, va="top",

@@ -134,15 +134,9 @@ class Canvas:
         return rect
 
     def line(
-        self,
-        points: Points,
-        *,
-        width: float = SIZES.line,
-        zorder: float = 3.0,
-        **style: Any,
+        self, points: Points, *, width: float = SIZES.line, zorder: float = 3.0, **style: Any
     ) -> None:
-        spots = [np.asarray(points, dtype=float)]
-        self.lines(spots, width=width, zorder=zorder, **style)
+        self.lines([np.asarray(points, dtype=float)], width=width, zorder=zorder, **style)
 
     def lines(
         self,
@@ -170,17 +164,11 @@ class Canvas:
         )  # fmt: skip
 
     def polygon(
-        self,
-        points: Points,
-        colour: str,
-        *,
-        alpha: float = 1.0,
-        zorder: float = 3.0,
+        self, points: Points, colour: str, *, alpha: float = 1.0, zorder: float = 3.0
     ) -> None:
-        self.axes.add_patch(
-            Polygon(np.asarray(points), closed=True, facecolor=colour, edgecolor="none",
-                    linewidth=0.0, alpha=alpha, zorder=zorder, clip_on=False)
-        )  # fmt: skip
+        style = {"facecolor": colour, "edgecolor": "none", "alpha": alpha, "zorder": zorder}
+        patch = Polygon(np.asarray(points), closed=True, linewidth=0.0, clip_on=False, **style)
+        self.axes.add_patch(patch)
 
     def disc(
         self, centre: Array, radius: float, colour: str | Array, *, alpha: float = 1.0
@@ -223,15 +211,11 @@ class Canvas:
         across = np.array([-along[1], along[0]])
         head = min(self.px(16.0), 0.75 * length)
         neck = end - head * along
+        style: dict[str, Any] = {"colour": self.theme.accent, "alpha": alpha, "zorder": zorder}
         if length > head * 1.01:
-            shaft = [start, neck + 0.2 * head * along]
-            self.line(
-                shaft, width=SIZES.bold, colour=self.theme.accent, alpha=alpha, zorder=zorder,
-                cap="butt",
-            )  # fmt: skip
+            self.line([start, neck + 0.2 * head * along], width=SIZES.bold, cap="butt", **style)
         side = 0.34 * head * across
-        tip = [neck + side, end, neck - side]
-        self.polygon(tip, self.theme.accent, alpha=alpha, zorder=zorder)
+        self.polygon([neck + side, end, neck - side], **style)
 
 
 def _pieces(rect: Rect, extent: tuple[float, float], rotation: float) -> list[Rect]:
@@ -256,13 +240,13 @@ def _text_rect(
     x_left = {"left": 0.0, "center": -width / 2, "right": -width}[ha]
     low = {"baseline": 0.0, "bottom": 0.0, "top": -height}.get(va, -height / 2)
     c, s = math.cos(math.radians(rotation)), math.sin(math.radians(rotation))
-    ends = [(a, b) for a in (x_left, x_left + width) for b in (low, low + height)]
-    xs = [x + a * c - b * s for a, b in ends]
-    ys = [y + a * s + b * c for a, b in ends]
-    return min(xs), min(ys), max(xs), max(ys)
+    a, b = np.meshgrid((x_left, x_left + width), (low, low + height))
+    xs, ys = x + a * c - b * s, y + a * s + b * c
+    return float(xs.min()), float(ys.min()), float(xs.max()), float(ys.max())
 
 
-_ANGLES = tuple(2.0 * math.pi * turn / 24 for turn in range(24))
+_ANGLES = (2.0 * math.pi * turn / 24 for turn in range(24))
+_DIRECTIONS = tuple((math.cos(angle), math.sin(angle)) for angle in _ANGLES)
 _DISTANCES = (8.0, 14.0, 22.0, 34.0, 50.0, 70.0, 100.0, 140.0)
 LEADER_FROM = 20.0
 """Labels farther than this from their point, px of a 1600 × 1200 figure, get a leader."""
@@ -306,11 +290,8 @@ class Occupancy:
         )
 
     def between(self, start: tuple[float, float], end: tuple[float, float]) -> float:
-        steps = np.linspace(0.0, 1.0, 24)
-        rows = ((start[1] + (end[1] - start[1]) * steps) / self.cell).astype(int)
-        columns = ((start[0] + (end[0] - start[0]) * steps) / self.cell).astype(int)
-        rows = np.clip(rows, 0, self.cost.shape[0] - 1)
-        columns = np.clip(columns, 0, self.cost.shape[1] - 1)
+        spots = (np.linspace(start, end, 24) / self.cell).astype(int)
+        columns, rows = np.clip(spots, 0, np.array(self.cost.shape[::-1]) - 1).T
         return 2.0 if float(self.cost[rows, columns].max()) >= TEXT_COST else 0.0
 
     def at(self, rect: Rect) -> float:
@@ -329,13 +310,14 @@ class PlacedLabel:
     distance: float  # px; from the anchor to the nearest point of the box
     cost: float  # of the area it covers; 0 for a free area
 
+    def draw_leader(self, canvas: Canvas, colour: str, zorder: float = 3.0) -> None:
+        x = min(max(self.anchor[0], self.rect[0]), self.rect[2])
+        y = min(max(self.anchor[1], self.rect[1]), self.rect[3])
+        canvas.line([(x, y), self.anchor], width=SIZES.hair, colour=colour, zorder=zorder)
+
 
 def place_label(
-    anchors: Points,
-    size: tuple[float, float],
-    frame: Rect,
-    occupancy: Occupancy,
-    unit: float,
+    anchors: Points, size: tuple[float, float], frame: Rect, occupancy: Occupancy, unit: float
 ) -> PlacedLabel | None:
     best: PlacedLabel | None = None
     best_score = math.inf
@@ -344,13 +326,9 @@ def place_label(
         for distance in _DISTANCES:
             if 0.012 * distance >= best_score:
                 break
-            for angle in _ANGLES:
-                c, s = math.cos(angle), math.sin(angle)
+            for c, s in _DIRECTIONS:
                 # as far out as puts the box's edge at the distance
-                reach = min(
-                    half_w / abs(c) if abs(c) > 1e-9 else math.inf,
-                    half_h / abs(s) if abs(s) > 1e-9 else math.inf,
-                )
+                reach = min(half_w / max(abs(c), 1e-9), half_h / max(abs(s), 1e-9))
                 x = anchor[0] + c * (distance * unit + reach)
                 y = anchor[1] + s * (distance * unit + reach)
                 rect = (x - half_w, y - half_h, x + half_w, y + half_h)
@@ -378,20 +356,12 @@ def write_label(
     *,
     size: float = SIZES.text,
     weight: str = "normal",
-    colour: str | None = None,
+    **style: Any,
 ) -> PlacedLabel | None:
     """Write a label in free space beside one of several points; None where no space is free."""
     extent = canvas.text_size(text, size, weight)
     placed = place_label(anchors, extent, frame, occupancy, canvas.factor)
     if placed is not None:
-        canvas.text(
-            *placed.centre, text, size=size, weight=weight, colour=colour, ha="center",
-            va="center_baseline", halo=canvas.theme.paper,
-        )  # fmt: skip
+        style |= {"ha": "center", "va": "center_baseline", "halo": canvas.theme.paper}
+        canvas.text(*placed.centre, text, size=size, weight=weight, **style)
     return placed
-
-
-def draw_leader(canvas: Canvas, placed: PlacedLabel, colour: str, zorder: float = 3.0) -> None:
-    x = min(max(placed.anchor[0], placed.rect[0]), placed.rect[2])
-    y = min(max(placed.anchor[1], placed.rect[1]), placed.rect[3])
-    canvas.line([(x, y), placed.anchor], width=SIZES.hair, colour=colour, zorder=zorder)

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +17,6 @@ from warpspace.outputs.drawing.canvas import (
     Canvas,
     Occupancy,
     Points,
-    draw_leader,
     write_label,
 )
 from warpspace.outputs.drawing.off_screen import (
@@ -56,7 +57,22 @@ class Stage:
             canvas, text, anchors, self.frame, self.occupancy, weight="bold", colour=colour
         )
         if placed and placed.distance > canvas.px(LEADER_FROM) and len(anchors) > 1:
-            draw_leader(canvas, placed, colour, 3.9)
+            placed.draw_leader(canvas, colour, 3.9)
+
+
+def draw_split(
+    canvas: Canvas,
+    lines_mm: Iterable[Array],
+    projection: Projection,
+    raster: Raster | None,
+    *,
+    alpha: tuple[float, float],
+    **style: Any,
+) -> None:
+    """Draw the visible parts of polylines thin, the hidden ones as hair lines."""
+    parts = split_visible(lines_mm, projection, raster)
+    for lines, width, opacity in zip(parts, (SIZES.thin, SIZES.hair), alpha, strict=True):
+        canvas.lines(lines, width=width, alpha=opacity, **style)
 
 
 ARROW_COST = 12.0
@@ -72,21 +88,21 @@ def label_isolines(
     for level, lines in by_level.items():
         text = spell_short(level)
         size = canvas.text_size(text, SIZES.small)
-        best: tuple[float, float, float, float] | None = None
-        for line in sorted(lines, key=_length, reverse=True)[:_CANDIDATE_LINES]:
-            if _length(line) < 4.0 * size[0]:
-                continue
-            for share in _SHARES:
-                x, y, angle = _label_position(line, share, size)
-                box = (x - size[0] / 2, y - size[1] / 2, x + size[0] / 2, y + size[1] / 2)
-                cost = occupancy.at(box)
-                if best is None or cost < best[0] - 0.05:
-                    best = (cost, x, y, angle)
+        best, least = None, math.inf
+        longest = sorted(lines, key=_length, reverse=True)[:_CANDIDATE_LINES]
+        long_enough = (line for line in longest if _length(line) >= 4.0 * size[0])
+        for line, share in product(long_enough, _SHARES):
+            x, y, angle = _label_position(line, share, size)
+            box = (x - size[0] / 2, y - size[1] / 2, x + size[0] / 2, y + size[1] / 2)
+            cost = occupancy.at(box)
+            if cost < least - 0.05:
+                best, least = (x, y, angle), cost
         if best is None:
             continue
+        x, y, angle = best
         rect = canvas.text(
-            best[1], best[2], text, size=SIZES.small, colour=colour, halo=halo, ha="center",
-            va="center_baseline", rotation=best[3], zorder=3.1,
+            x, y, text, size=SIZES.small, colour=colour, halo=halo, ha="center",
+            va="center_baseline", rotation=angle, zorder=3.1,
         )  # fmt: skip
         occupancy.add_rects([rect])
 
@@ -117,8 +133,8 @@ def draw_corners(stage: Stage) -> None:
     front = float(depth.min()) + 0.02 * float(np.ptp(depth)) + 1.0
     labels: list[tuple[str, Array, Array]] = []
     for corner, deep in zip(corners, depth, strict=True):
-        tail, tip = projection.project(nominal[corner]), projection.project(drawn[corner])
         ends = np.stack([nominal[corner], drawn[corner]])
+        tail, tip = projection.project(ends)
         near = bool(deep <= front) or _is_seen(stage, ends)
         opacity = 1.0 if near else 0.4
         canvas.arrow(tail, tip, alpha=opacity, zorder=4.0 if near else 3.4)
@@ -215,12 +231,10 @@ def fit_map(
     beside_mm: Array | None = None,
 ) -> Projection:
     """Fit one projection in which each of several maps fills a box."""
-    insets = [canvas.px(inset) for inset in (INSETS if labels else SMALL_INSETS)]
-    width, height = rect[2] - rect[0], rect[3] - rect[1]
-    insets = [
-        min(inset, 0.24 * side) for inset, side in zip(insets, (width, height) * 2, strict=True)
-    ]
-    inner = (rect[0] + insets[0], rect[1] + insets[1], rect[2] - insets[2], rect[3] - insets[3])
+    sides = (rect[2] - rect[0], rect[3] - rect[1]) * 2
+    room = zip(INSETS if labels else SMALL_INSETS, sides, strict=True)
+    x, y, right, top = (min(canvas.px(inset), 0.24 * side) for inset, side in room)
+    inner = (rect[0] + x, rect[1] + y, rect[2] - right, rect[3] - top)
     points = [map_points_mm(picture) for picture in pictures]
     points += [] if beside_mm is None else [beside_mm]
     return fit_projection(view, np.concatenate(points), inner)
@@ -344,14 +358,11 @@ def _draw_axes(stage: Stage) -> None:
 def _silhouette_edge(axis: int, low: Array, high: Array, projection: Projection) -> Array | None:
     if high[axis] - low[axis] <= 0.0:
         return None
-    plane_axes = [other for other in range(3) if other != axis]
-    edges: list[Array] = []
-    for first in (low[plane_axes[0]], high[plane_axes[0]]):
-        for second in (low[plane_axes[1]], high[plane_axes[1]]):
-            ends = np.stack([low, high])
-            ends[:, plane_axes[0]], ends[:, plane_axes[1]] = first, second
-            edges.append(ends)
-    spots = projection.project(np.array(edges))
+    edges = np.tile(np.stack([low, high]), (4, 1, 1))
+    across = [other for other in range(3) if other != axis]
+    corners = product(*((low[other], high[other]) for other in across))
+    edges[:, :, across] = np.array(list(corners))[:, None]
+    spots = projection.project(edges)
     centre = projection.project((low + high) / 2.0)
     along = spots[0, 1] - spots[0, 0]
     length = float(np.hypot(*along))
@@ -403,9 +414,8 @@ def _draw_axis(stage: Stage, axis: int, ends_mm: Array, spots: Array) -> None:
         angle = math.degrees(math.atan2(along[1], along[0]))
         angle = (angle + 90.0) % 180.0 - 90.0 if abs(abs(angle) - 90.0) > 1e-6 else 90.0
         height = canvas.text_size("X", SIZES.text)[1]
-        middle = (start + end) / 2.0 + base + (reach + canvas.px(6.0) + 0.7 * height) * normal
+        x, y = (start + end) / 2.0 + base + (reach + canvas.px(6.0) + 0.7 * height) * normal
         name = f"{'XYZ'[axis]} [mm]"
-        x, y = middle
         canvas.text(x, y, name, ha="center", va="center_baseline", rotation=angle)
 
 

@@ -69,14 +69,12 @@ def fit_projection(
     centre = (flat.min(axis=0) + flat.max(axis=0)) / 2.0
     plane = np.stack([(flat - centre) @ right, (flat - centre) @ up], -1)
     low, high = plane.min(axis=0), plane.max(axis=0)
-    size_px = np.array([rect[2] - rect[0], rect[3] - rect[1]])
+    start, end = np.reshape(rect, (2, 2))
     spans = np.maximum(high - low, 1e-9)
     if px_per_mm is None:
-        px_per_mm = float(np.min(size_px / spans)) if (high - low).max() > 1e-9 else 1.0
-    middle = np.array([(rect[0] + rect[2]) / 2.0, (rect[1] + rect[3]) / 2.0])
-    return Projection(
-        right, up, towards, px_per_mm, centre, middle - px_per_mm * (low + high) / 2.0
-    )
+        px_per_mm = float(np.min((end - start) / spans)) if (high - low).max() > 1e-9 else 1.0
+    centre_px = (start + end) / 2.0 - px_per_mm * (low + high) / 2.0
+    return Projection(right, up, towards, px_per_mm, centre, centre_px)
 
 
 Bytes = NDArray[np.uint8]
@@ -152,16 +150,15 @@ def render_bodies(bodies: Sequence[RenderedBody], projection: Projection) -> Ras
 
     points = np.concatenate([body.vertices_mm for body in bodies])
     spots = projection.project(points)
-    x_left, bottom = (np.floor(spots.min(axis=0)) - MARGIN_PX).astype(int)
-    right, top = (np.ceil(spots.max(axis=0)) + MARGIN_PX).astype(int)
-    width, height = int(right - x_left), int(top - bottom)
+    low = np.floor(spots.min(axis=0)) - MARGIN_PX
+    high = np.ceil(spots.max(axis=0)) + MARGIN_PX
+    width, height = (high - low).astype(int).tolist()
     small = max(width, height) * SUPERSAMPLING <= _LARGEST_SIDE_PX
     small = small and width * height * SUPERSAMPLING**2 <= _LARGEST_AREA_PX
     step = SUPERSAMPLING if small else 1
-    middle = np.array([(x_left + right) / 2.0, (bottom + top) / 2.0])
-    rgba, depth = _draw(bodies, projection, middle, (width * step, height * step), step)
+    rgba, depth = _draw(bodies, projection, (low + high) / 2.0, (width * step, height * step), step)
     farthest = np.asarray(maximum_filter(depth, 2 * step + 1, mode="nearest"), np.float32)
-    return Raster(rgba, depth, farthest, (float(x_left), float(bottom), float(right), float(top)))
+    return Raster(rgba, depth, farthest, (*low.tolist(), *high.tolist()))
 
 
 def _draw(

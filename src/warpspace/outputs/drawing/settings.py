@@ -14,10 +14,7 @@ from warpspace.analysis.commands.concepts import Concepts
 from warpspace.exceptions import OptionError
 from warpspace.geometry.colour import COMPONENTS
 from warpspace.kinematics.model import Loop
-from warpspace.machine.limits import MAX_FIGURE_AREA_PX as LARGEST_AREA
-from warpspace.machine.limits import MAX_FIGURE_SIDE_PX as LARGEST_SIDE
-from warpspace.machine.limits import MIN_FIGURE_PX as SMALLEST_SIZE
-from warpspace.machine.limits import RANGE_TOP
+from warpspace.machine import limits
 from warpspace.picture import model
 from warpspace.picture.formatting import range_words
 from warpspace.scene.model import Scene, common_loop
@@ -126,7 +123,7 @@ class FigureSettings:
         if self.view not in model.VIEWS:
             raise OptionError(f"view {self.view!r}; expected one of {', '.join(model.VIEWS)}")
         model.fixed_exaggeration(self.exaggeration, None)
-        low, high = RANGE_TOP
+        low, high = limits.RANGE_TOP
         if self.range_top is not None and not low <= self.range_top <= high:
             problem = f"range_top {self.range_top:g}; expected a number above 0"
             raise OptionError(f"{problem}, from {low:g} to {high:,.0f}")
@@ -147,12 +144,13 @@ class FigureSettings:
 
 def check_size(size: tuple[int, int]) -> None:
     width, height = size
-    small = width < SMALLEST_SIZE[0] or height < SMALLEST_SIZE[1]
-    if small or max(size) > LARGEST_SIDE or width * height > LARGEST_AREA:
+    least, most = limits.MIN_FIGURE_PX, limits.MAX_FIGURE_SIDE_PX
+    area = limits.MAX_FIGURE_AREA_PX
+    small = width < least[0] or height < least[1]
+    if small or max(size) > most or width * height > area:
         raise OptionError(
-            f"size {width}x{height}; expected {SMALLEST_SIZE[0]}x{SMALLEST_SIZE[1]} to"
-            f" {LARGEST_SIDE} px a side and {LARGEST_AREA // 1_000_000} million px in all,"
-            " for instance 1600x1200"
+            f"size {width}x{height}; expected {least[0]}x{least[1]} to {most} px a side and"
+            f" {area // 1_000_000} million px in all, for instance 1600x1200"
         )
 
 
@@ -168,21 +166,16 @@ def evaluate_for(
         quantity=quantity,
     )
     (picture,) = share_colours(settings, [picture])
-    conditions = (*picture.conditions, *settings.conditions)
+    conditions, scale = [*picture.conditions, *settings.conditions], picture.scale
     if settings.range_fixed and settings.range_top is not None:
-        scale = picture.scale
-        conditions = (*conditions, range_words(scale.low, scale.high, scale.unit))
-    return replace(picture, conditions=conditions)
+        conditions.append(range_words(scale.low, scale.high, scale.unit))
+    return replace(picture, conditions=tuple(conditions))
 
 
 def share_colours(
     settings: FigureSettings, pictures: Sequence[model.ScenePicture]
 ) -> list[model.ScenePicture]:
     """Apply one colour scale to pictures."""
-    scale = model.choose_scale(
-        [picture.values for picture in pictures],
-        settings.component,
-        pictures[0].quantity,
-        settings.range_top,
-    )
+    values, quantity = [picture.values for picture in pictures], pictures[0].quantity
+    scale = model.choose_scale(values, settings.component, quantity, settings.range_top)
     return [replace(picture, colours=scale) for picture in pictures]

@@ -6,6 +6,7 @@ fit are omitted; matplotlib's legend does neither.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -114,21 +115,20 @@ def draw_colour_bar(
 ) -> None:
     """Draw a colour bar with numbers on its right and marked values on its left."""
     x_left, low, right, high = rect
-    theme = canvas.theme
+    theme, ticks = canvas.theme, scale.ticks
     colours = scale.colours(np.linspace(scale.high, scale.low, LEVELS))[:, None, :]
-    canvas.image(colours, (x_left, low, right, high), zorder=2.0)
+    canvas.image(colours, rect, zorder=2.0)
     canvas.rectangle(
         x_left, low, right - x_left, high - low, fill=False, edgecolor=theme.muted,
         linewidth=canvas.px(1.0) * 0.72, zorder=2.6,
     )  # fmt: skip
-    span = scale.high - scale.low
     height = canvas.text_size("0", SIZES.text)[1]
     tick_step = 1
-    while (high - low) / max(1, (len(scale.ticks) - 1) / tick_step) < 1.6 * height:
+    while (high - low) / max(1, (len(ticks) - 1) / tick_step) < 1.6 * height:
         tick_step += 1
-    zero = min(range(len(scale.ticks)), key=lambda i: abs(scale.ticks[i]))
-    for index, tick in enumerate(scale.ticks):
-        y = low + (tick - scale.low) / span * (high - low)
+    zero = min(range(len(ticks)), key=lambda i: abs(ticks[i]))
+    for index, tick in enumerate(ticks):
+        y = low + (tick - scale.low) / (scale.high - scale.low) * (high - low)
         if scale.low < tick < scale.high:
             colour = theme.grid if scale.diverging else theme.isoline
             canvas.line([(x_left, y), (right, y)], width=SIZES.thin, colour=colour, zorder=2.5)
@@ -146,58 +146,41 @@ def _draw_marks(
     distance = canvas.px(19.0)
     ordered = sorted(marks, key=lambda mark: mark[1])
     spots = [low + float(scale.fraction(np.asarray(value))) * (high - low) for _, value in ordered]
-    heights = list(spots)
-    for index in range(1, len(heights)):
-        heights[index] = max(heights[index], heights[index - 1] + distance)
-    overflow = heights[-1] - (high + canvas.px(6.0)) if heights else 0.0
-    if overflow > 0.0:
-        heights[-1] -= overflow
-        for index in range(len(heights) - 2, -1, -1):
-            heights[index] = min(heights[index], heights[index + 1] - distance)
-    for (name, value), spot, height in zip(ordered, spots, heights, strict=True):
+    # names keep a distance upwards, then downwards from the end of the bar
+    heights = list(accumulate(spots, lambda below, spot: max(spot, below + distance)))
+    heights[-1:] = [min(height, high + canvas.px(6.0)) for height in heights[-1:]]
+    downwards = accumulate(heights[::-1], lambda above, height: min(height, above - distance))
+    tip, side, small = x_left - canvas.px(2.0), canvas.px(5.0), SIZES.small
+    base = tip - canvas.px(9.0)
+    for (name, value), spot, height in zip(ordered, spots, list(downwards)[::-1], strict=True):
         beyond = " ↑" if value > scale.high else " ↓" if value < scale.low else ""
-        tip = x_left - canvas.px(2.0)
-        side = canvas.px(5.0)
-        base = tip - canvas.px(9.0)
-        canvas.polygon(
-            [(tip, spot), (base, spot + side), (base, spot - side)], canvas.theme.ink, zorder=3.0
-        )
+        canvas.polygon([(tip, spot), (base, spot + side), (base, spot - side)], canvas.theme.ink)
         if abs(height - spot) > canvas.px(1.0):
-            canvas.line([(base, spot), (base - canvas.px(5.0), height)], width=SIZES.hair)
-        canvas.text(
-            base - canvas.px(7.0), height, name + beyond, size=SIZES.small, ha="right",
-            va="center_baseline",
-        )  # fmt: skip
+            canvas.line([(base, spot), (base - side, height)], width=SIZES.hair)
+        x = base - canvas.px(7.0)
+        canvas.text(x, height, name + beyond, size=small, ha="right", va="center_baseline")
 
 
 def draw_scale_bars(
     canvas: Canvas, rect: Rect, px_per_mm: float, exaggeration: float | None
 ) -> float:
     """Draw one bar for lengths and one for displacements, both as seen in the picture plane."""
-    x_left, y, right, _ = rect
-    max_width = min(right - x_left, canvas.px(190.0))
-    theme = canvas.theme
-    y += canvas.px(6.0)
-    if exaggeration is not None:
-        px_per_um = px_per_mm * MM_PER_UM * exaggeration
-        length = round_down(max_width / px_per_um)
-        name = f"{spell_short(length)} µm displacement ({spell_factor(exaggeration)})"
-        _draw_bar(canvas, x_left, y, length * px_per_um, theme.accent, name, right)
-        y += canvas.px(52.0)
-    length = round_down(max_width / px_per_mm)
-    name = f"{spell_short(length)} mm geometry"
-    _draw_bar(canvas, x_left, y, length * px_per_mm, theme.ink, name, right)
-    return y + canvas.px(34.0)
-
-
-def _draw_bar(
-    canvas: Canvas, x: float, y: float, length: float, colour: str, name: str, end: float
-) -> None:
+    x, y, right, _ = rect
     foot = canvas.px(6.0)
-    points = [(x, y - foot), (x, y), (x + length, y), (x + length, y - foot)]
-    canvas.line(points, colour=colour, cap="butt")
-    y += canvas.px(13.0)
-    canvas.text(x, y, name, size=SIZES.small, colour=colour, max_width=end - x)
+    y += foot
+    bars = [(px_per_mm, "mm geometry", canvas.theme.ink)]
+    if exaggeration is not None:
+        name = f"µm displacement ({spell_factor(exaggeration)})"
+        bars.insert(0, (px_per_mm * MM_PER_UM * exaggeration, name, canvas.theme.accent))
+    for px_per_unit, quantity, colour in bars:
+        length = round_down(min(right - x, canvas.px(190.0)) / px_per_unit)
+        end, name = x + length * px_per_unit, f"{spell_short(length)} {quantity}"
+        points = [(x, y - foot), (x, y), (end, y), (end, y - foot)]
+        canvas.line(points, colour=colour, cap="butt")
+        height = y + canvas.px(13.0)
+        canvas.text(x, height, name, size=SIZES.small, colour=colour, max_width=right - x)
+        y += canvas.px(52.0)
+    return y - canvas.px(18.0)
 
 
 HINTED = 0.92
@@ -236,21 +219,18 @@ def _wrap(canvas: Canvas, facts: Sequence[str], max_width: float) -> list[str]:
 def scene_facts(picture: ScenePicture, exaggeration: float | None) -> list[str]:
     """List the conditions of a picture: machine, volume, loop, reference, factor."""
     scene, grid = picture.scene, picture.grid
-    title = scene.machine.title
-    facts = [f"{title}, chain {scene.machine.chain}"]
+    facts = [f"{scene.machine.title}, chain {scene.machine.chain}"]
     extent = [value for value in grid.extent_mm if value > 0.0]
     if extent:
         size = f" {TIMES} ".join(f"{value:.5g}" for value in extent)
         nodes = f" {TIMES} ".join(str(count) for count in grid.shape if count > 1)
-        facts.append(f"working volume {size} mm")
-        facts.append(f"{nodes} nodes")
-    positions = [
-        f"{axis} {spell_short(position)}{scene.machine.axes[axis].unit}"
-        for axis, position in scene.workspace.positions.items()
-        if axis in scene.machine.axes and not scene.machine.axes[axis].is_linear
+        facts += [f"working volume {size} mm", f"{nodes} nodes"]
+    axes, positions = scene.machine.axes, scene.workspace.positions.items()
+    placed = [(axes[name], at) for name, at in positions if name in axes]
+    rotary = [
+        f"{axis.name} {spell_short(at)}{axis.unit}" for axis, at in placed if not axis.is_linear
     ]
-    if positions:
-        facts.append(" ".join(positions))
+    facts += [" ".join(rotary)] if rotary else []
     facts += [LOOP_WORDS[picture.view.loop], reference_words(scene), *picture.conditions]
     if exaggeration is not None:
         facts += [f"displacement drawn {spell_factor(exaggeration)}", "orthographic"]
@@ -261,15 +241,12 @@ def parameter_words(scene: Scene) -> list[str]:
     """Spell the parameters that are not zero, the largest first, µrad before µm."""
     ranked: list[tuple[bool, float, str]] = []
     for key in scene.errors:
-        value = scene.errors.amplitude(key)
-        if value == 0.0 or parameter(key).axis not in scene.machine.axes:
+        value, row = scene.errors.amplitude(key), parameter(key)
+        if value == 0.0 or row.axis not in scene.machine.axes:
             continue
         kind = scene.errors.functions[key].name
-        tail = "" if kind == "constant" else f" {kind}"
-        row = parameter(key)
-        ranked.append(
-            (not row.is_rotation, -abs(value), f"{key} {spell_short(value)} {row.unit}{tail}")
-        )
+        text = f"{key} {spell_short(value)} {row.unit}{'' if kind == 'constant' else f' {kind}'}"
+        ranked.append((not row.is_rotation, -abs(value), text))
     return [text for _, _, text in sorted(ranked)]
 
 
@@ -306,14 +283,12 @@ def draw_footer(
 
 
 def _fitting_text(canvas: Canvas, head: str, items: Sequence[str], max_width: float) -> str:
-    if not items:
-        return head + "all zero"
-    for count in range(len(items), 0, -1):
-        omitted = len(items) - count
-        text = head + " · ".join(items[:count]) + (f" · and {omitted} more" if omitted else "")
+    for omitted in range(len(items)):
+        parts = [*items[: len(items) - omitted], *([f"and {omitted} more"] if omitted else [])]
+        text = head + " · ".join(parts)
         if canvas.text_size(text, SIZES.small)[0] <= max_width:
             return text
-    return head + items[0]
+    return head + (items[0] if items else "all zero")
 
 
 def map_legend(

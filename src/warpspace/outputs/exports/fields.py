@@ -14,7 +14,7 @@ from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField
 from warpspace.field.grid import DIMENSIONS, cut, pieces
 from warpspace.machine.axes import is_linear
-from warpspace.outputs.file_output import check_target, write_atomically
+from warpspace.outputs.file_output import check_target, write_atomically, write_content
 from warpspace.picture.model import ScenePicture
 from warpspace.resources import __version__
 from warpspace.scene.text_files import guard_cell, spell_row
@@ -132,28 +132,21 @@ def _write_parquet(record: FieldRecord, path: Path) -> None:
             append(block)
 
 
-def _arrays(record: FieldRecord) -> dict[str, Array]:
-    field = record.field
-    return {
-        "nominal_mm": field.nominal_mm,
-        "error_um": field.error_um,
-        "norm_um": field.norm_um,
-        "orientation_urad": field.orientation_urad,
-        **record.u95,
-    }
+def field_arrays(field: ErrorField) -> dict[str, Array]:
+    return {name: getattr(field, name) for name in ("error_um", "norm_um", "orientation_urad")}
 
 
 def _write_npz(record: FieldRecord, path: Path) -> None:
-    axes = {name: values for name, values in record.columns.items() if name.startswith("axis_")}
-    about = np.array(json.dumps(dict(record.about), ensure_ascii=False))
+    arrays = {"nominal_mm": record.field.nominal_mm, **field_arrays(record.field), **record.u95}
+    arrays |= {name: values for name, values in record.columns.items() if name.startswith("axis_")}
+    arrays[ABOUT] = np.array(json.dumps(dict(record.about), ensure_ascii=False))
     with path.open("wb") as file:
-        np.savez(file, allow_pickle=False, **_arrays(record), **axes, **{ABOUT: about})
+        np.savez(file, allow_pickle=False, **arrays)
 
 
 def _write_vts(record: FieldRecord, path: Path) -> None:
-    arrays = _arrays(record)
-    mesh = structured_grid(arrays.pop("nominal_mm"), arrays)
-    writer = _vts_writer(mesh, ABOUT, record.about)
+    arrays = {**field_arrays(record.field), **record.u95}
+    writer = _vts_writer(structured_grid(record.field.nominal_mm, arrays), ABOUT, record.about)
     writer.SetDataModeToAppended()
     writer.EncodeAppendedDataOff()
     writer.SetCompressorTypeToNone()
@@ -211,19 +204,13 @@ PROVENANCE = "warpspace_json"
 
 
 def write_vts(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
-    data = build_vts(picture)
-    with write_atomically(path, overwrite=overwrite) as temporary:
-        temporary.write_bytes(data)
+    write_content(build_vts(picture), path, overwrite=overwrite)
 
 
 def build_vts(picture: ScenePicture) -> bytes:
-    field = picture.field
-    arrays = {
-        "error_um": field.error_um,
-        "norm_um": field.norm_um,
-        "orientation_urad": field.orientation_urad,
+    arrays = field_arrays(picture.field) | {
         "deformed_mm": picture.drawn_mm,
-        "displacement_mm": field.error_um * (picture.exaggeration * MM_PER_UM),
+        "displacement_mm": picture.field.error_um * (picture.exaggeration * MM_PER_UM),
     }
     mesh = structured_grid(picture.grid.nominal_mm, arrays)
     mesh.point_data.active_vectors_name = "displacement_mm"

@@ -12,8 +12,8 @@ from warpspace.field.grid import DEFAULT_NODES
 from warpspace.geometry import surfaces
 from warpspace.geometry.colour import srgb_to_linear
 from warpspace.kinematics.model import Loop
-from warpspace.outputs.exports.fields import structured_grid
-from warpspace.outputs.file_output import write_atomically
+from warpspace.outputs.exports.fields import field_arrays, structured_grid
+from warpspace.outputs.file_output import write_content
 from warpspace.picture.map_mesh import thick_nodes
 from warpspace.picture.model import Exaggeration, ScenePicture, evaluate_picture
 from warpspace.picture.traces import TraceLine, trace_lines
@@ -33,24 +33,14 @@ _ATTRIBUTES = {
 
 
 def write_glb(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
-    data = build_glb(picture)
-    with write_atomically(path, overwrite=overwrite) as temporary:
-        temporary.write_bytes(data)
+    write_content(build_glb(picture), path, overwrite=overwrite)
 
 
 def build_glb(picture: ScenePicture) -> bytes:
-    parts = [
-        _surface(picture),
-        *_lines(picture),
-        *_traces(picture),
-        *_bodies(picture),
-    ]
-    scale = picture.scale
-    colours = {"map": scale.name} | {
-        name: getattr(scale, name) for name in ("low", "high", "label", "unit")
-    }
+    names = ("low", "high", "label", "unit")
+    colours = {"map": picture.scale.name, **{name: getattr(picture.scale, name) for name in names}}
     return build_gltf(
-        parts,
+        [_surface(picture), *_lines(picture), *_traces(picture), *_bodies(picture)],
         root=f"warpspace {picture.scene.name} ×{picture.exaggeration:g}",
         generator=picture.provenance["program"],
         extras={**picture.provenance, "attributes": _ATTRIBUTES, "colours": colours},
@@ -75,13 +65,14 @@ def _bent(
 
 
 def _surface(picture: ScenePicture) -> GltfNode:
-    field = picture.field
     nominal = thick_nodes(picture, picture.grid.nominal_mm)
     surface = surfaces.outer_surface(nominal.shape[:3])
     at = surfaces.spread_nodes(picture.shape)[surface.nodes]
-    error = field.error_um.reshape(-1, 3)[at]
     colours = picture.scale.colours(picture.values.reshape(-1)[at])
-    tilts = field.orientation_urad.reshape(-1, 3)[at]
+    error, tilts = (
+        vectors.reshape(-1, 3)[at]
+        for vectors in (picture.field.error_um, picture.field.orientation_urad)
+    )
     return _bent(
         picture,
         "deformed_surface",
@@ -98,12 +89,13 @@ def _lines(picture: ScenePicture) -> Iterator[GltfNode]:
     shape, ink = picture.shape, Material("line", INK)
     nominal = picture.grid.nominal_mm.reshape(-1, 3)
     error = picture.field.error_um.reshape(-1, 3)
-    grid = surfaces.segments(surfaces.grid_lines(shape, surfaces.line_spacing(shape)))
-    at, pairs = np.unique(grid, return_inverse=True)
-    yield _bent(picture, "deformed_grid", nominal[at], error[at], pairs.reshape(-1, 2), ink)
-    edges = surfaces.segments(surfaces.box_edges(shape))
-    at, pairs = np.unique(edges, return_inverse=True)
-    yield _bent(picture, "deformed_edges", nominal[at], error[at], pairs.reshape(-1, 2), ink)
+    grid, edges = (
+        surfaces.grid_lines(shape, surfaces.line_spacing(shape)),
+        surfaces.box_edges(shape),
+    )
+    for name, lines in (("deformed_grid", grid), ("deformed_edges", edges)):
+        at, pairs = np.unique(surfaces.segments(lines), return_inverse=True)
+        yield _bent(picture, name, nominal[at], error[at], pairs.reshape(-1, 2), ink)
     yield GltfNode("ghost", to_gltf(nominal[at]), pairs.reshape(-1, 2), Material("ghost", GHOST))
 
 
@@ -116,13 +108,11 @@ def _named_traces(picture: ScenePicture) -> Iterator[tuple[str, TraceLine]]:
 def _traces(picture: ScenePicture) -> Iterator[GltfNode]:
     nominal, actual = Material("trace nominal", NOMINAL), Material("trace actual", TRACE)
     for label, drawn in _named_traces(picture):
-        nominal_mm, count = drawn.nominal_mm, len(drawn.nominal_mm)
-        pairs = np.stack([np.arange(count - 1), np.arange(1, count)], -1)
-        yield GltfNode(
-            f"trace nominal {label}", to_gltf(nominal_mm), pairs, nominal, group="traces"
-        )
+        points_mm, name = drawn.nominal_mm, f"trace nominal {label}"
+        pairs = surfaces.segments([np.arange(len(points_mm))])
+        yield GltfNode(name, to_gltf(points_mm), pairs, nominal, group="traces")
         name = f"trace actual {label}"
-        yield _bent(picture, name, nominal_mm, drawn.error_um, pairs, actual, group="traces")
+        yield _bent(picture, name, points_mm, drawn.error_um, pairs, actual, group="traces")
 
 
 def _bodies(picture: ScenePicture) -> list[GltfNode]:
@@ -194,13 +184,8 @@ def to_pyvista(
     import pyvista as pv
 
     picture = evaluate_picture(scene, exaggeration=exaggeration, grid=grid, loop=loop)
-    field = picture.field
-    arrays = {
-        "error_um": field.error_um,
-        "norm_um": field.norm_um,
-        "orientation_urad": field.orientation_urad,
-        "tilt_urad": np.linalg.norm(field.orientation_urad, axis=-1),
-    }
+    arrays = field_arrays(picture.field)
+    arrays["tilt_urad"] = np.linalg.norm(picture.field.orientation_urad, axis=-1)
     if parts:
         basis = grid_basis(scene, picture.grid, picture.view)
         for key, response in zip(basis.keys, basis.position, strict=True):
@@ -218,12 +203,15 @@ def to_pyvista(
         colour = np.array(part.body.colour, dtype=np.uint8)
         mesh.cell_data["colour"] = np.tile(colour, (len(part.body.triangles), 1))
         bodies.append(mesh, part.body.name)
-    blocks = pv.MultiBlock()
-    blocks.append(structured_grid(picture.drawn_mm, arrays), "deformed")
-    blocks.append(structured_grid(picture.grid.nominal_mm, arrays), "nominal")
-    blocks.append(_surface_block(picture, arrays), "surface")
-    blocks.append(traces, "traces")
-    blocks.append(bodies, "bodies")
+    blocks = pv.MultiBlock(
+        {
+            "deformed": structured_grid(picture.drawn_mm, arrays),
+            "nominal": structured_grid(picture.grid.nominal_mm, arrays),
+            "surface": _surface_block(picture, arrays),
+            "traces": traces,
+            "bodies": bodies,
+        }
+    )
     blocks.field_data["exaggeration"] = np.array([picture.exaggeration])
     blocks.field_data["scene"] = [scene.name]
     blocks.field_data["program"] = [picture.provenance["program"]]
@@ -234,8 +222,8 @@ def _surface_block(picture: ScenePicture, arrays: Mapping[str, Array]) -> "pv.Po
     import pyvista as pv
 
     drawn = picture.drawn_mm.reshape(-1, 3)
+    nodes = np.arange(len(drawn))
     if surfaces.is_thin(picture.shape):
-        nodes = np.arange(len(drawn))
         # PyVista makes one vertex of a single point
         mesh = pv.PolyData(drawn) if len(nodes) == 1 else pv.MultipleLines(drawn)
     else:

@@ -30,7 +30,11 @@ EFFORT, VELOCITY = 1000.0, 1.0  # of every joint: required by URDF, not part of 
 def write_urdf(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
     """Write the nominal machine of a scene, with one mesh file for each frame with bodies."""
     target, machine = Path(path), picture.scene.machine
-    meshes = _meshes(picture)
+    parts: dict[str, list[Any]] = {}
+    for body in load_bodies(machine):
+        mesh = trimesh.Trimesh(body.vertices_mm, body.triangles, process=False)
+        parts.setdefault(body.frame, []).append(mesh)
+    meshes = {frame: trimesh.util.concatenate(bodies) for frame, bodies in parts.items()}
     read = [Path(source.path) for source in machine.bodies.values() if source.path]
     files = mesh_files(target, meshes, overwrite=overwrite, inputs=read)
     robot = build_robot(machine, {frame: file.name for frame, file in files.items()})
@@ -38,14 +42,6 @@ def write_urdf(picture: ScenePicture, path: str | Path, *, overwrite: bool = Tru
     text = BytesIO()
     model.write_xml_file(text)
     write_with_meshes(target, text.getvalue(), files, meshes, overwrite=overwrite)
-
-
-def _meshes(picture: ScenePicture) -> dict[str, Any]:
-    parts: dict[str, list[Any]] = {}
-    for body in load_bodies(picture.scene.machine):
-        mesh = trimesh.Trimesh(body.vertices_mm, body.triangles, process=False)
-        parts.setdefault(body.frame, []).append(mesh)
-    return {frame: trimesh.util.concatenate(bodies) for frame, bodies in parts.items()}
 
 
 def build_robot(machine: Machine, meshes: dict[str, str]) -> Any:

@@ -1,6 +1,6 @@
 """Figures with the machine: displaced bodies around the deformed volume; traces of the table."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,8 +12,8 @@ from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.kinematics.chain import BASE
 from warpspace.machine.definition import Vector
 from warpspace.outputs.drawing import map3d, off_screen
-from warpspace.outputs.drawing.canvas import Canvas, Occupancy, draw_leader, write_label
-from warpspace.outputs.drawing.settings import SIZES, FigureSettings, Theme, evaluate_for
+from warpspace.outputs.drawing.canvas import Canvas, Occupancy, write_label
+from warpspace.outputs.drawing.settings import LIGHT, SIZES, FigureSettings, Theme, evaluate_for
 from warpspace.outputs.drawing.sheet import (
     Drawing,
     DrawnMap,
@@ -41,22 +41,18 @@ DARKER = 0.62
 
 
 def _drawn_body(part: PlacedBody, theme: Theme) -> off_screen.RenderedBody:
-    shade = 1.0 if theme.name == "light" else DARKER
+    shade = 1.0 if theme is LIGHT else DARKER
     red, green, blue = (shade * channel / 255.0 for channel in part.body.colour)
-    triangles = part.body.triangles.astype(np.intp)
-    return off_screen.RenderedBody(
-        part.vertices_mm, triangles, colour=(red, green, blue), shaded=True
-    )
+    triangles, colour = part.body.triangles.astype(np.intp), (red, green, blue)
+    return off_screen.RenderedBody(part.vertices_mm, triangles, colour=colour, shaded=True)
 
 
 def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     picture = evaluate_for(settings, scenes[0])
     title = f"Machine and working volume: {picture.scene.title}"
     placed = place_bodies(picture.scene, picture.view, picture.exaggeration)
-    facts = [
-        *scene_facts(picture, picture.exaggeration),
-        "bodies schematic, deformed and tilted like their frames",
-    ]
+    facts = scene_facts(picture, picture.exaggeration)
+    facts.append("bodies schematic, deformed and tilted like their frames")
     legend = [
         line_entry("nominal volume", lambda theme: theme.ink, SIZES.thin, map3d.GHOST_DASHES, 0.6),
         line_entry("deformed volume", lambda theme: theme.ink),
@@ -96,17 +92,14 @@ def draw_bodies(
     if raster is None:
         return None
     map3d.draw_raster(canvas, raster, opacity, zorder)
-
-    def draw(edges: Iterable[Array], colour: str, alpha: float, height: float) -> None:
+    undisplaced = [replace(part, exaggeration=0.0) for part in placed if part.body.frame != BASE]
+    for bodies, colour, alpha, height in (
+        (placed, theme.grid, 0.75, 0.1),
+        (undisplaced if nominal else (), theme.ghost, 0.8, 0.05),
+    ):
+        edges = (edge for part in bodies for edge in part.edges_mm)
         visible, _ = off_screen.split_visible(edges, projection, raster)
         canvas.lines(visible, width=SIZES.hair, colour=colour, alpha=alpha, zorder=zorder + height)
-
-    draw((edge for part in placed for edge in part.edges_mm), theme.grid, 0.75, 0.1)
-    if nominal:
-        nominal_bodies = [
-            replace(part, exaggeration=0.0) for part in placed if part.body.frame != BASE
-        ]
-        draw((edge for part in nominal_bodies for edge in part.edges_mm), theme.ghost, 0.8, 0.05)
     return raster
 
 
@@ -134,20 +127,16 @@ def _draw_volume_lines(
     theme, shape = canvas.theme, picture.shape
     nodes, nominal = picture.drawn_mm.reshape(-1, 3), picture.grid.nominal_mm.reshape(-1, 3)
     faces = surfaces.outer_faces(shape)
-    nx, ny, nz = (2 * nodes for nodes in surfaces.line_spacing(shape))
+    x, y, z = surfaces.line_spacing(shape)
     for lines, width, alpha in (
-        (surfaces.face_lines(faces, shape, (nx, ny, nz)), SIZES.hair, 0.35),
+        (surfaces.face_lines(faces, shape, (2 * x, 2 * y, 2 * z)), SIZES.hair, 0.35),
         (surfaces.crease_lines(faces, shape) or surfaces.box_edges(shape), SIZES.line, 0.95),
     ):
         visible, _ = off_screen.split_visible((nodes[line] for line in lines), projection, volume)
         canvas.lines(visible, width=width, colour=theme.grid, alpha=alpha, zorder=2.0)
-    parts = off_screen.split_visible(
-        (nominal[edge] for edge in surfaces.box_edges(shape)), projection, machine
-    )
-    for lines, width, alpha in zip(parts, (SIZES.thin, SIZES.hair), (0.6, 0.3), strict=True):
-        canvas.lines(
-            lines, width=width, colour=theme.ink, alpha=alpha, dashes=map3d.GHOST_DASHES, zorder=2.2
-        )
+    edges = (nominal[edge] for edge in surfaces.box_edges(shape))
+    style = {"colour": theme.ink, "dashes": map3d.GHOST_DASHES, "zorder": 2.2}
+    map3d.draw_split(canvas, edges, projection, machine, alpha=(0.6, 0.3), **style)
 
 
 def _label_bodies(
@@ -257,29 +246,21 @@ def _draw_lines(
     raster: off_screen.Raster | None,
 ) -> None:
     theme = canvas.theme
-    parts = off_screen.split_visible((trace.nominal_mm for trace in traces), projection, raster)
-    for lines, width, alpha in zip(parts, (SIZES.thin, SIZES.hair), (1.0, 0.5), strict=True):
-        canvas.lines(
-            lines, width=width, colour=theme.muted, alpha=alpha, dashes=TRACE_DASHES, zorder=3.0
-        )
-    visible: list[Array] = []
-    hidden: list[Array] = []
-    visible_colours: list[Array] = []
-    hidden_colours: list[Array] = []
+    nominal = (trace.nominal_mm for trace in traces)
+    style = {"colour": theme.muted, "dashes": TRACE_DASHES, "zorder": 3.0}
+    map3d.draw_split(canvas, nominal, projection, raster, alpha=(1.0, 0.5), **style)
+    lines: tuple[list[Array], list[Array]] = ([], [])  # visible and hidden ones
+    colours: tuple[list[Array], list[Array]] = ([], [])
     for trace, values in zip(traces, coloured, strict=True):
         for start in range(0, len(values) - 1, PIECE):
             piece = slice(start, start + PIECE + 1)
-            colour = scale.colours(values[piece].mean()) / 255.0
-            in_front, behind = off_screen.split_visible(
-                [trace.actual_mm[piece]], projection, raster
-            )
-            visible += in_front
-            hidden += behind
-            visible_colours += [colour] * len(in_front)
-            hidden_colours += [colour] * len(behind)
-    canvas.lines(hidden, width=3.4, colour=np.array(hidden_colours), alpha=0.45, zorder=3.3)
-    canvas.lines(visible, width=4.6, colour=theme.ink, zorder=3.4)
-    canvas.lines(visible, width=3.4, colour=np.array(visible_colours), zorder=3.5)
+            split = off_screen.split_visible([trace.actual_mm[piece]], projection, raster)
+            for number, part in enumerate(split):
+                lines[number].extend(part)
+                colours[number].extend([scale.colours(values[piece].mean()) / 255.0] * len(part))
+    canvas.lines(lines[1], width=3.4, colour=np.array(colours[1]), alpha=0.45, zorder=3.3)
+    canvas.lines(lines[0], width=4.6, colour=theme.ink, zorder=3.4)
+    canvas.lines(lines[0], width=3.4, colour=np.array(colours[0]), zorder=3.5)
 
 
 def _label_traces(
@@ -302,7 +283,7 @@ def _label_traces(
         text = text.replace("-", MINUS)
         placed = write_label(canvas, text, line[away[:24:4]], frame, occupancy, size=SIZES.small)
         if placed is not None:
-            draw_leader(canvas, placed, canvas.theme.muted)
+            placed.draw_leader(canvas, canvas.theme.muted)
 
 
 def _points(traces: Sequence[TraceLine]) -> dict[Vector, str]:

@@ -1,13 +1,13 @@
 """Maps of one scene: the bent working volume, slices of it, how far the tool axis leans."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from warpspace.analysis.statistics import statistics
+from warpspace.analysis.statistics import Statistics, statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.field.grid import PLANES, build_slice, slice_ranges
@@ -30,8 +30,8 @@ from warpspace.outputs.drawing.sheet import (
     scene_facts,
     start_sheet,
 )
-from warpspace.picture.formatting import list_axes, quantity_words, spell_coordinate, spell_factor
-from warpspace.picture.model import Picture, ScenePicture, Slice, map_faces, view_words
+from warpspace.picture.formatting import IN_R, list_axes, quantity_words, spell_factor, spell_in_r
+from warpspace.picture.model import ScenePicture, Slice, map_faces, view_words
 from warpspace.scene.model import Scene
 from warpspace.units import MICRORADIAN, RAD_PER_URAD, Array, spell, spell_short
 
@@ -53,18 +53,16 @@ def draw_error_map(scenes: Sequence[Scene], settings: FigureSettings, *, exact: 
 
 
 def draw_statistics(
-    sheet: Sheet, picture: Picture, px_per_mm: float, *, above: Sequence[Row] = ()
+    sheet: Sheet, picture: ScenePicture, px_per_mm: float, *, above: Sequence[Row] = ()
 ) -> None:
     summary, values = picture.statistics, picture.values
     rows: list[Row] = [
-        ("max |E|", f"{spell(summary.max_um)} µm"),
-        ("mean |E|", f"{spell(summary.mean_um)} µm"),
-        ("P95", f"{spell(summary.p95_um)} µm"),
+        *_summary_rows(summary, "|E|", "µm"),
         ("RMS", f"{spell(summary.rms_um)} µm"),
-        *(_place_rows(summary.max_at_axes, summary.max_at_mm) if summary.max_um > 0.0 else ()),
+        *(_place_rows(summary) if summary.max_um > 0.0 else ()),
     ]
     marks = [("mean", summary.mean_um), ("P95", summary.p95_um), ("max", summary.max_um)]
-    if isinstance(picture, ScenePicture) and picture.scene.limit_um is not None:
+    if picture.scene.limit_um is not None:
         marks.append(("limit", picture.scene.limit_um))
     if picture.component != "norm":
         low, high = float(values.min()), float(values.max())
@@ -89,13 +87,15 @@ def isoline_words(scale: ColourScale, values: Array | None = None) -> str:
     return f"{ISOLINE_STEP}{spell_short(step)} {scale.unit}"
 
 
-def _place_rows(at: Mapping[str, float], point_mm: Sequence[float]) -> list[Row]:
-    linear = {name: value for name, value in at.items() if is_linear(name)}
-    point = " ".join(
-        f"{name} {spell_coordinate(value)}" for name, value in zip("xyz", point_mm, strict=True)
-    )
+def _summary_rows(summary: Statistics, name: str, unit: str) -> list[Row]:
+    values = {f"max {name}": summary.max_um, f"mean {name}": summary.mean_um, "P95": summary.p95_um}
+    return [(label, f"{spell(value)} {unit}") for label, value in values.items()]
+
+
+def _place_rows(summary: Statistics) -> list[Row]:
+    linear = {name: value for name, value in summary.max_at_axes.items() if is_linear(name)}
     axes: list[Row] = [("max, axes", list_axes(linear))] if linear else []
-    return [*axes, ("max, in R", point)]
+    return [*axes, ("max, in R", spell_in_r(summary.max_at_mm).removeprefix(f"{IN_R} "))]
 
 
 VIEW_OF = {"Z": "top", "Y": "front", "X": "right"}
@@ -112,21 +112,19 @@ def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     sheet = start_sheet("slices", settings, title, facts, scenes, legend, exact=exact)
     canvas = sheet.canvas
     cells = _cells(canvas, sheet.content, slices)
-    fitted = [
-        map3d.fit_map(canvas, [part], cells[part.axis], VIEW_OF[part.axis]) for part in slices
-    ]
-    px_per_mm = min(one.px_per_mm for one in fitted)
+    px_per_mm = min(
+        map3d.fit_map(canvas, [part], cells[part.axis], VIEW_OF[part.axis]).px_per_mm
+        for part in slices
+    )
     maps: list[DrawnMap] = []
-    for part, fit in zip(slices, fitted, strict=True):
+    for part in slices:
         cell, view = cells[part.axis], VIEW_OF[part.axis]
-        middle = np.array([cell[0] + cell[2], cell[1] + cell[3]]) / 2.0
-        nominal = part.grid.nominal_mm.reshape(-1, 3)
-        centre = (nominal.min(axis=0) + nominal.max(axis=0)) / 2.0
-        projection = replace(fit, px_per_mm=px_per_mm, centre_mm=centre, centre_px=middle)
+        points = part.grid.nominal_mm
+        projection = off_screen.fit_projection(view, points, cell, px_per_mm)
         maps.append(map3d.draw_map(canvas, part, cell, view, projection=projection))
         name = f"{PLANES[part.axis]} plane at axis {part.axis} = {spell_short(part.position_mm)} mm"
-        high = cell[3] - canvas.px(12.0)
-        canvas.text(middle[0], high, name, weight="bold", ha="center", va="top")
+        middle, high = (cell[0] + cell[2]) / 2.0, cell[3] - canvas.px(12.0)
+        canvas.text(middle, high, name, weight="bold", ha="center", va="top")
     _draw_key(canvas, picture, slices, cells["key"])
     draw_statistics(sheet, picture, px_per_mm, above=[("whole volume", "")])
     return sheet.finish(exaggeration, maps)
@@ -142,23 +140,17 @@ def _evaluate_slices(picture: ScenePicture, nodes: int) -> list[Slice]:
         )
     slices: list[Slice] = []
     for axis in ("Z", "Y", "X"):
-        low, high = ranges[axis]
-        at = (low + high) / 2.0
+        at, view = sum(ranges[axis]) / 2.0, picture.view
         grid = build_slice(scene.model, scene.workspace, axis, at, nodes)
+        field = evaluate_first_order(
+            scene.model, scene.errors, grid.coordinates, view, grid.point_mm
+        )
         slices.append(
             Slice(
-                view=picture.view,
-                grid=grid,
-                field=evaluate_first_order(
-                    scene.model, scene.errors, grid.coordinates, picture.view, grid.point_mm
-                ),
-                exaggeration=picture.exaggeration,
-                component=picture.component,
-                colours=picture.scale,
-                axis=axis,
-                position_mm=at,
+                view=view, grid=grid, field=field, exaggeration=picture.exaggeration,
+                component=picture.component, colours=picture.scale, axis=axis, position_mm=at,
             )
-        )
+        )  # fmt: skip
     return slices
 
 
@@ -201,9 +193,8 @@ def _draw_key(
     visible, _ = off_screen.split_visible(creases, projection, raster)
     canvas.lines(visible, width=SIZES.thin, colour=theme.grid, zorder=2.0)
     edges = (nodes[edge] for edge in surfaces.box_edges(picture.grid.shape))
-    visible, hidden = off_screen.split_visible(edges, projection, raster)
-    canvas.lines(visible, width=SIZES.thin, colour=theme.ghost, dashes=map3d.GHOST_DASHES)
-    canvas.lines(hidden, width=SIZES.hair, colour=theme.ghost, alpha=0.5, dashes=map3d.GHOST_DASHES)
+    style = {"colour": theme.ghost, "dashes": map3d.GHOST_DASHES}
+    map3d.draw_split(canvas, edges, projection, raster, alpha=(1.0, 0.5), **style)
     x, y = (rect[0] + rect[2]) / 2.0, rect[3] - canvas.px(12.0)
     heading = "positions of the slices (not exaggerated)"
     canvas.text(x, y, heading, weight="bold", ha="center", va="top")
@@ -215,30 +206,12 @@ NEEDLES = 5  # needles along each edge, about
 NEEDLE_DASHES = (6.0, 4.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Needles:
-    """Tool axes to draw at the nodes."""
-
-    axis: Array  # [N, 3]; nominal tool axis, unit vectors
-    lean: Array  # [N, 3]; exaggerated lean of its end, per length of the needle
-    length_mm: float
-    tilt_urad: Array  # [N]
-    feet: surfaces.Index  # [n]; nodes of their lower ends
-
-    def ends_mm(self, nodes_mm: Array, at: surfaces.Index) -> tuple[Array, Array]:
-        """Compute nominal and drawn ends of needles, [n, 2, 3] each, mm."""
-        foot = nodes_mm[at]
-        nominal = np.stack([foot, foot + self.length_mm * self.axis[at]], 1)
-        drawn = np.stack([foot, foot + self.length_mm * (self.axis[at] + self.lean[at])], 1)
-        return nominal, drawn
-
-
 def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     picture = evaluate_for(settings, scenes[0], quantity="orientation")
     values, scale, view = picture.values, picture.scale, settings.view
     drawn = replace(picture.field.tilts, nominal_mm=picture.grid.nominal_mm)
     summary = statistics(drawn, picture.grid.coordinates)
-    requested, nodes = settings.exaggeration, picture.grid.nominal_mm.reshape(-1, 3)
+    requested = settings.exaggeration
     factor = _lean_factor(summary.max_um) if requested is None or requested == "auto" else requested
     title = f"Orientation error of the tool axis: {picture.scene.title}"
     facts = [
@@ -254,28 +227,26 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
         *isoline_entries(isoline_words(scale, values)),
     ]
     sheet = start_sheet("orientation-map", settings, title, facts, scenes, legend, exact=exact)
-    needles = _needles(picture, factor, view)
+    needles, feet = _needles(picture, factor), _feet(picture.shape, view)
     content = replace(picture, exaggeration=0.0)  # the volume itself is drawn undeformed
-    ends = np.concatenate(needles.ends_mm(nodes, needles.feet)).reshape(-1, 3)
+    ends = needles[:, feet].reshape(-1, 3)
     projection = map3d.fit_map(sheet.canvas, [content], sheet.content, view, beside_mm=ends)
     drawn = map3d.draw_map(
         sheet.canvas, content, sheet.content, view, projection=projection,
-        annotate=partial(_draw_needles, needles), ghost=False,
+        annotate=partial(_draw_needles, needles, feet), ghost=False,
     )  # fmt: skip
     heading = "tilt" if settings.component == "norm" else f"rotation about {settings.component}"
     per_degree = math.radians(1.0) / RAD_PER_URAD / factor
     rows = [
-        ("max tilt", f"{spell(summary.max_um)} {MICRORADIAN}"),
-        ("mean tilt", f"{spell(summary.mean_um)} {MICRORADIAN}"),
-        ("P95", f"{spell(summary.p95_um)} {MICRORADIAN}"),
-        *_place_rows(summary.max_at_axes, summary.max_at_mm),
+        *_summary_rows(summary, "tilt", MICRORADIAN),
+        *_place_rows(summary),
         ("1° of drawn lean", f"{spell(per_degree)} {MICRORADIAN}"),
     ]
     marks = [("mean", float(values.mean())), ("max", float(values.max()))]
     if settings.component != "norm":
         marks.insert(0, ("min", float(values.min())))
-    bars = (projection.px_per_mm, None)
-    sheet.draw_panel(scale, f"{heading}  [{MICRORADIAN}]", marks, rows, bars)
+    heading = f"{heading}  [{MICRORADIAN}]"
+    sheet.draw_panel(scale, heading, marks, rows, (projection.px_per_mm, None))
     return sheet.finish(factor, [drawn])
 
 
@@ -285,35 +256,37 @@ def _lean_factor(largest_urad: float) -> float:
     return surfaces.round_down(max(LEAN_RAD / (largest_urad * RAD_PER_URAD), 1.0))
 
 
-def _needles(picture: ScenePicture, factor: float, view: str) -> Needles:
+def _needles(picture: ScenePicture, factor: float) -> Array:
+    """Compute the ends of the nominal and of the leaning tool axis at each node, [2, N, 2, 3]."""
     pose = branch_pose(picture.scene.model, "tool", picture.grid.coordinates)
+    foot = picture.grid.nominal_mm.reshape(-1, 3)
     axis = pose[..., :3, :3] @ np.array(TOOL_AXIS)
     axis = np.broadcast_to(axis, picture.grid.nominal_mm.shape).reshape(-1, 3)
     turn = picture.field.orientation_urad.reshape(-1, 3)
     lean = factor * RAD_PER_URAD * np.cross(turn, axis)
-    tilt, length = np.linalg.norm(turn, axis=-1), NEEDLE_SHARE * picture.size_mm
-    return Needles(axis, lean, length, tilt, _feet(picture, view))
+    length = NEEDLE_SHARE * picture.size_mm
+    tips = (foot + length * direction for direction in (axis, axis + lean))
+    return np.stack([np.stack([foot, tip], 1) for tip in tips])
 
 
-def _draw_needles(needles: Needles, stage: map3d.Stage) -> None:
-    nodes, theme = stage.picture.grid.nominal_mm.reshape(-1, 3), stage.canvas.theme
-    nominal, drawn = needles.ends_mm(nodes, needles.feet)
+def _draw_needles(needles: Array, feet: surfaces.Index, stage: map3d.Stage) -> None:
+    theme = stage.canvas.theme
     for ends, colour, width, dashes in (
-        (nominal, theme.ghost, SIZES.thin, NEEDLE_DASHES),
-        (drawn, theme.accent, SIZES.bold, None),
+        (needles[0], theme.ghost, SIZES.thin, NEEDLE_DASHES),
+        (needles[1], theme.accent, SIZES.bold, None),
     ):
-        lines, _ = stage.split(ends)
+        lines, _ = stage.split(ends[feet])
         stage.canvas.lines(lines, width=width, colour=colour, dashes=dashes, zorder=4.0)
         stage.occupancy.add_lines(lines)
-    corners = surfaces.corners(stage.picture.shape)
-    for corner, ends in zip(corners, needles.ends_mm(nodes, corners)[1], strict=True):
+    tilt_urad = np.linalg.norm(stage.picture.field.orientation_urad.reshape(-1, 3), axis=-1)
+    for corner in surfaces.corners(stage.picture.shape):
+        ends = needles[1, corner]
         if stage.split([ends])[0]:
-            text = f"{spell(float(needles.tilt_urad[corner]))} {MICRORADIAN}"
+            text = f"{spell(float(tilt_urad[corner]))} {MICRORADIAN}"
             stage.label(text, [stage.projection.project(ends[1])])
 
 
-def _feet(content: Picture, view: str) -> surfaces.Index:
-    shape = content.shape
+def _feet(shape: surfaces.Shape, view: str) -> surfaces.Index:
     surface = surfaces.triangulate(map_faces(shape, cut=view == "iso")).nodes
     surface = surface if len(surface) else np.arange(np.prod(shape))
     at = np.stack(np.unravel_index(surface, shape), -1)

@@ -3,10 +3,11 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from warpspace.analysis.commands.adjust import Adjust, AdjustResult
+from warpspace.analysis.commands.adjust import Adjust
 from warpspace.analysis.commands.concepts import LETTERS, Concept, compare_concepts
 from warpspace.bodies.placed import PlacedBody, place_bodies
 from warpspace.machine.axes import parameter
@@ -30,14 +31,17 @@ from warpspace.outputs.figures.machine_figures import draw_bodies
 from warpspace.outputs.figures.maps import ISOLINE_STEP, isoline_words
 from warpspace.picture.comparison import (
     CHANGE,
-    DIFFERENCE_LENGTH,
     STATISTICS,
     scene_change,
     share_exaggeration,
-    statistics_change,
 )
 from warpspace.picture.formatting import LOOP_WORDS, tolerance_words
-from warpspace.picture.model import ScenePicture, picture_concept, view_words
+from warpspace.picture.model import (
+    DIFFERENCE_LENGTH,
+    ScenePicture,
+    picture_concept,
+    view_words,
+)
 from warpspace.scene.model import Scene, common_loop
 from warpspace.units import Array, spell, spell_count, spell_short, spell_signed
 
@@ -113,38 +117,30 @@ def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
     for x, name in zip(columns, ("A", "B", CHANGE, DIFFERENCE_LENGTH), strict=True):
         canvas.text(x, y, name, weight="bold", ha="right")
     summaries = [drawn.picture.statistics for drawn in maps]
-    change = statistics_change(summaries[0], summaries[1])
     for name, key in STATISTICS.items():
         y -= canvas.px(28.0)
         canvas.text(start, y, name, colour=canvas.theme.muted)
         a, b, difference = (getattr(part, key) for part in summaries)
-        texts = (spell(a), spell(b), spell_signed(change[key]), spell(difference))
+        texts = (spell(a), spell(b), spell_signed(b - a), spell(difference))
         for x, text in zip(columns, texts, strict=True):
             canvas.text(x, y, text, ha="right")
 
 
 def draw_adjustment(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     scene = scenes[0]
-    adjustment = Adjust(loop=settings.chosen_loop, grid=min(settings.grid, REPAIR_NODES[1])).run(
-        scene
-    )
-    after = adjustment.changes()[-1].scene if adjustment.adjustments else scene
-    pair = (
-        replace(scene, title="before"),
-        replace(after, title="after", name=f"{scene.name}_adjusted"),
-    )
-    title = f"Adjustment: {scene.title}"
-    return _draw_pair("adjust", title, pair, settings, [_adjusted(adjustment)], exact=exact)
-
-
-def _adjusted(adjustment: AdjustResult) -> str:
-    if not adjustment.adjustments:
-        return "no adjustment required"
-    parts = ", ".join(
-        f"{key} {adjustment.present[key]:.3g} → {value:.3g} {parameter(key).unit}"
-        for key, value in adjustment.adjustments[-1].adjust.items()
-    )
-    return f"adjusted for the smallest {adjustment.objective.upper()}: {parts}"
+    grid = min(settings.grid, REPAIR_NODES[1])
+    adjustment = Adjust(loop=settings.chosen_loop, grid=grid).run(scene)
+    after, remark = scene, "no adjustment required"
+    if adjustment.adjustments:
+        after = adjustment.changes()[-1].scene
+        parts = ", ".join(
+            f"{key} {adjustment.present[key]:.3g} → {value:.3g} {parameter(key).unit}"
+            for key, value in adjustment.adjustments[-1].adjust.items()
+        )
+        remark = f"adjusted for the smallest {adjustment.objective.upper()}: {parts}"
+    after = replace(after, title="after", name=f"{scene.name}_adjusted")
+    pair, title = (replace(scene, title="before"), after), f"Adjustment: {scene.title}"
+    return _draw_pair("adjust", title, pair, settings, [remark], exact=exact)
 
 
 BODY_ALPHA = 0.55
@@ -155,17 +151,15 @@ CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0
 def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     plan = replace(settings.concepts, loop=common_loop(scenes, settings.loop))
     concepts = compare_concepts(scenes, plan)
-    pictures = share_colours(
-        replace(settings, component="norm"),
-        [picture_concept(concept, settings.grid) for concept in concepts],
-    )
+    pictures = [picture_concept(concept, settings.grid) for concept in concepts]
+    pictures = share_colours(replace(settings, component="norm"), pictures)
     scale, first = pictures[0].scale, concepts[0]
     title = f"Concepts within {'their own' if plan.own_tolerances else 'the same'} tolerances"
     facts = [
         *([] if plan.own_tolerances else [tolerance_words(first.scene.tolerances)]),
         f"{spell_count(plan.samples)} sampled machines each, {plan.drawn}",
         "largest |E| of each" if plan.over == "max" else "|E| at a random point of each",
-        LOOP_WORDS[first.sampled.view.loop],
+        LOOP_WORDS[first.sampled.case.view.loop],
         view_words(settings.view, (2, 2, 2)),
     ]
     legend = [
@@ -209,12 +203,8 @@ def _draw_machines(
     for picture, placed, points, area in zip(pictures, bodies, extents, areas, strict=True):
         projection = fit_projection(view, points, area, px_per_mm)
         draw_bodies(canvas, placed, projection, opacity=BODY_ALPHA, nominal=False, zorder=0.8)
-        maps.append(
-            draw_map(
-                canvas, picture, area, view, labels=False, projection=projection, annotate=None,
-                ghost=False,
-            )
-        )  # fmt: skip
+        style: dict[str, Any] = {"labels": False, "annotate": None, "ghost": False}
+        maps.append(draw_map(canvas, picture, area, view, projection=projection, **style))
     return tuple(maps), px_per_mm
 
 
@@ -250,11 +240,8 @@ def _draw_labels(canvas: Canvas, cell: Rect, letter: str, concept: Concept) -> N
     x, scene, sampled = x_left + canvas.px(8.0), concept.scene, concept.sampled
     head, high = f"{letter}  {scene.title}", top - canvas.px(4.0)
     canvas.text(x, high, head, size=SIZES.heading, weight="bold", va="top", max_width=max_width)
-    numbers = [
-        f"mean {spell(sampled.mean_um)} µm",
-        f"P95 {spell(sampled.p95_um)} µm",
-        f"max {spell(sampled.max_um)} µm",
-    ]
+    values = {"mean": sampled.mean_um, "P95": sampled.p95_um, "max": sampled.max_um}
+    numbers = [f"{name} {spell(value)} µm" for name, value in values.items()]
     if sampled.probability is not None:
         conforming = 100.0 * sampled.probability.probability
         numbers.append(f"{conforming:.1f} % within {spell_short(sampled.probability.spec_um)} µm")

@@ -82,12 +82,6 @@ class Reviewed:
     uncertainty: FieldUncertainty | None  # None where the scene states none
 
     @property
-    def is_within_limit(self) -> bool:
-        """True if the largest error is within the limit, or without a limit."""
-        limit = self.scene.limit_um
-        return limit is None or self.statistics.max_um <= limit
-
-    @property
     def scene(self) -> Scene:
         return self.picture.scene
 
@@ -104,21 +98,19 @@ class Reviewed:
     @property
     def verdict(self) -> Verdict:
         """Verdict on the limit; of the model alone where the uncertainty is unknown."""
-        statistics, limit = self.statistics, self.scene.limit_um
-        u95 = statistics.expanded_uncertainty.get("u95_max_um")
+        u95 = self.statistics.expanded_uncertainty.get("u95_max_um")
+        limit, largest = self.scene.limit_um, self.statistics.max_um
         if self.uncertainty is None or u95 is None or limit is None:
-            return Verdict.PASS if self.is_within_limit else Verdict.FAIL
-        errors, largest = self.uncertainty.errors, statistics.max_um
-        probability = float(errors.probability_within(largest, u95, -np.inf, limit))
-        return Verdict.from_probability(probability)
+            return Verdict.FAIL if limit is not None and largest > limit else Verdict.PASS
+        probability = self.uncertainty.errors.probability_within(largest, u95, -np.inf, limit)
+        return Verdict.from_probability(float(probability))
 
     @property
     def worst_axes(self) -> str:
         """Axis positions of the worst point, formatted."""
-        summary = self.statistics
-        return list_axes(point_axes(self.scene, summary.max_at_axes)) or spell_in_r(
-            summary.max_at_mm
-        )
+        summary = self.picture.statistics
+        axes = list_axes(point_axes(self.scene, summary.max_at_axes))
+        return axes or spell_in_r(summary.max_at_mm)
 
     @property
     def volume(self) -> str:
@@ -137,10 +129,6 @@ class Review:
     scenes: tuple[Reviewed, ...]
     # of |E_B − E_A|: the length of second minus first, as vectors, node by node
     difference: Statistics | None
-
-    @property
-    def exaggeration(self) -> float:
-        return self.scenes[0].picture.exaggeration
 
 
 def share_pictures(scenes: Sequence[Scene], settings: ReportSettings) -> tuple[ScenePicture, ...]:
@@ -175,10 +163,12 @@ def build_review(
 
 def _review_scene(letter: str, picture: ScenePicture, settings: ReportSettings) -> Reviewed:
     scene, summary = picture.scene, picture.statistics
-    results = {
-        name: _run_analysis(analysis, scene)
-        for name, analysis in settings.analyses(scene.limit_um).items()
-    }
+    results: dict[str, Result | str] = {}
+    for name, analysis in settings.analyses(scene.limit_um).items():
+        try:
+            results[name] = analysis.run(scene, ignore_progress)
+        except WarpspaceError as error:
+            results[name] = str(error)
     at = {name: np.asarray(value) for name, value in summary.max_at_axes.items()}
     point = np.asarray(summary.max_at_mm)
     return Reviewed(
@@ -187,7 +177,7 @@ def _review_scene(letter: str, picture: ScenePicture, settings: ReportSettings) 
         explain(scene.model, scene.errors, at, picture.view, point),
         second_order(scene, picture.view.loop).um,
         results,
-        _share_within(picture),
+        0.0 if scene.limit_um is None else share_below(picture.field, scene.limit_um),
         _advice(picture, results["advice"], settings),
         volume_uncertainty(scene, picture.view, settings.grid),
     )
@@ -196,18 +186,6 @@ def _review_scene(letter: str, picture: ScenePicture, settings: ReportSettings) 
 def _format_u95(summary: Statistics, name: str) -> str:
     u95 = summary.expanded_uncertainty
     return u95_behind(u95[f"u95_{name}"]) if u95 else ""
-
-
-def _share_within(picture: ScenePicture) -> float:
-    limit = picture.scene.limit_um
-    return 0.0 if limit is None else share_below(picture.field, limit)
-
-
-def _run_analysis(analysis: Analysis, scene: Scene) -> Result | str:
-    try:
-        return analysis.run(scene, ignore_progress)
-    except WarpspaceError as error:
-        return str(error)
 
 
 def _difference(first: ScenePicture, second: ScenePicture | None = None) -> Statistics | None:
@@ -231,7 +209,11 @@ def verdict(review: Review) -> str:
     """Format the verdict on the limit; of two scenes also the change of the mean error."""
     if len(review.scenes) == 1:
         return _verdict_on(review.scenes[0])
-    verdicts = [_verdict_on_limit(reviewed) for reviewed in review.scenes]
+    verdicts = [
+        f"{one.letter}: {one.verdict}, limit {spell_short(one.scene.limit_um)}{UM}. "
+        for one in review.scenes
+        if one.scene.limit_um is not None
+    ]
     a, b = (reviewed.statistics.mean_um for reviewed in review.scenes)
     change = (b - a) / a if a else 0.0
     comparison = f"{abs(100.0 * change):.0f}{PERCENT} {'less' if change < 0.0 else 'more'} than"
@@ -239,14 +221,6 @@ def verdict(review: Review) -> str:
         comparison = "the same as"
     comment = f"{comparison} A's {spell(a)}{UM}" if a else "that of A is zero"
     return f"{''.join(verdicts)}The mean error of B is {spell(b)}{UM}: {comment}."
-
-
-def _verdict_on_limit(reviewed: Reviewed) -> str:
-    limit = reviewed.scene.limit_um
-    if limit is None:
-        return ""
-    word = reviewed.verdict
-    return f"{reviewed.letter}: {word}, limit {spell_short(limit)}{UM}. "
 
 
 def _verdict_on(reviewed: Reviewed) -> str:
@@ -284,11 +258,10 @@ def _advice(picture: ScenePicture, adjustment: Result | str, settings: ReportSet
     if limit is not None and largest <= limit:
         effect += ", within the limit"
     elif limit is not None:
-        effect += f"; {volume_share(_share_within(after))} of the volume is within the limit"
-    present = spell_setting(adjustment.present[key])
-    return (
-        f"Adjust {key} ({row.name}) from {present} to {spell_signed(value)} {row.unit}: {effect}."
-    )
+        share = volume_share(share_below(after.field, limit))
+        effect += f"; {share} of the volume is within the limit"
+    change = f"from {spell_setting(adjustment.present[key])} to {spell_signed(value)} {row.unit}"
+    return f"Adjust {key} ({row.name}) {change}: {effect}."
 
 
 def first_page(review: Review, picture: Block) -> list[Block]:
@@ -309,8 +282,10 @@ def first_page(review: Review, picture: Block) -> list[Block]:
         numbers_block: Block = Cards(tuple(cards))
     else:
         columns = (Column("scene"), *number_columns(names, "s"))
+        pairs = list(zip(review.scenes, limits, strict=True))
+        exceeded = [limit is not None and one.statistics.max_um > limit for one, limit in pairs]
+        marks: list[Mark] = ["worse" if beyond else "" for beyond in exceeded]
         titles = [one.titled(one.scene.title) for one in review.scenes]
-        marks: list[Mark] = ["" if one.is_within_limit else "worse" for one in review.scenes]
         numbered = [(title, *row) for title, row in zip(titles, rows, strict=True)]
         numbers_block = Table(columns, numbered, marks=marks)
     noted = (

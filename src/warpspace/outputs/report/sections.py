@@ -11,7 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from warpspace.analysis.blocks import Bars, Column, Histogram, Lines, Mark, Table, number_columns
+from warpspace.analysis.blocks import (
+    Bars,
+    Column,
+    Histogram,
+    Lines,
+    Mark,
+    Panel,
+    Table,
+    number_columns,
+)
 from warpspace.analysis.blocks import Block as AnyBlock
 from warpspace.analysis.commands.concepts import Concepts
 from warpspace.analysis.description import ProgressCallback, Result, ignore_progress
@@ -23,7 +32,7 @@ from warpspace.machine.axes import parameter
 from warpspace.machine.limits import MAX_CSV_BYTES, MOST_CONCEPTS
 from warpspace.outputs.drawing.settings import PRINTED_PX, FigureSettings
 from warpspace.outputs.figures.registry import figure_kinds
-from warpspace.outputs.file_output import check_target, write_atomically
+from warpspace.outputs.file_output import check_target, write_content
 from warpspace.outputs.processes import FigureWorker
 from warpspace.outputs.report.review import (
     ReportSettings,
@@ -63,8 +72,8 @@ from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.scene.text_files import read_bytes
 from warpspace.units import spell, spell_short, spell_signed
 
-HEIGHT_PX = 400
-OTHER_PX = {"comparison": 490, "slices": 490, "error-curves": 490, "concepts": 490, "adjust": 490}
+HEIGHT_PX, HIGH_PX = 400, 490
+HIGH = ("comparison", "slices", "error-curves", "concepts", "adjust")  # figures of this height
 CHART = "warpspace.outputs.charts.block_charts:chart_figure"
 LINES_WIDTH = 0.72  # of the page, at which curves are printed as large as they are drawn
 Chart = Bars | Lines | Histogram
@@ -83,14 +92,13 @@ class ReportFigures:
         self,
         worker: FigureWorker,
         pictures: Sequence[ScenePicture],
-        loop: str | None,
-        grid: int,
+        settings: ReportSettings,
         form: str,
-        watch: ProgressCallback = ignore_progress,
+        watch: ProgressCallback,
     ) -> None:
-        self._worker, self._form, self._watch = worker, form, watch
+        self._worker, self._form, self._watch, self._settings = worker, form, watch, settings
         self._begun = self._done = 0
-        self._loop, self._grid, self._factor = loop, grid, pictures[0].exaggeration
+        self._factor = pictures[0].exaggeration
         self.missing: list[str] = []
         scenes = [picture.scene for picture in pictures]
         drawn = f"displacement drawn {spell_factor(self._factor)}"
@@ -131,9 +139,9 @@ class ReportFigures:
         """Begin a figure; if drawing fails twice, the figure is missing."""
         # the lean of the tool axis needs a factor of its own to be visible
         factor = "auto" if name == "orientation-map" else self._factor
-        if settings is None:
-            settings = FigureSettings(exaggeration=factor, loop=self._loop, grid=self._grid)
-        size = PRINTED_PX, OTHER_PX.get(name, HEIGHT_PX)
+        loop, grid = self._settings.loop, self._settings.grid
+        settings = settings or FigureSettings(exaggeration=factor, loop=loop, grid=grid)
+        size = PRINTED_PX, HIGH_PX if name in HIGH else HEIGHT_PX
         settings = replace(settings, size=size, printed=True)
         begin = partial(self._worker.begin, name, scenes, settings, self._form)
         begun = begin()
@@ -187,8 +195,7 @@ def write_report(
     form, embed = ("svg", embed) if page else ("pdf", None)
     report = build_report(scenes, settings, form=form, embed=embed, **parts)
     content = render_html(report).encode() if page else render_pdf(report)
-    with write_atomically(target, overwrite=overwrite) as temporary:
-        temporary.write_bytes(content)
+    write_content(content, target, overwrite=overwrite)
     return report
 
 
@@ -211,7 +218,7 @@ def build_report(
     settings = replace(settings, loop=common_loop(scenes, settings.loop))
     pictures = share_pictures(scenes, settings)
     with FigureWorker() as worker:
-        figures = ReportFigures(worker, pictures, settings.loop, settings.grid, form, watch)
+        figures = ReportFigures(worker, pictures, settings, form, watch)
         review = build_review(scenes, settings, pictures)
         extra = results or {}
         side_by_side = {"Comparison of concepts": concept_blocks(review, concepts, figures)}
@@ -290,18 +297,13 @@ def _is_zero(columns: Sequence[Column], row: Sequence[object]) -> bool:
 
 
 def _first_bars(bars: Bars) -> Bars:
-    panels = [
-        replace(
-            panel,
-            series=tuple(
-                replace(one, values=one.values[:MOST_BARS], spread=one.spread[:MOST_BARS])
-                for one in panel.series
-            ),
-        )
-        for panel in bars.panels
-    ]
-    rows, keys = bars.rows[:MOST_BARS], bars.keys[:MOST_BARS]
-    return replace(bars, rows=rows, keys=keys, panels=tuple(panels))
+    first = slice(MOST_BARS)
+    panels: list[Panel] = []
+    for panel in bars.panels:
+        pairs = ((one, one.values[first], one.spread[first]) for one in panel.series)
+        series = tuple(replace(one, values=values, spread=spread) for one, values, spread in pairs)
+        panels.append(replace(panel, series=series))
+    return replace(bars, rows=bars.rows[first], keys=bars.keys[first], panels=tuple(panels))
 
 
 def notes(review: Review, figures: ReportFigures, story: StorySteps | None) -> Iterator[Block]:
@@ -357,7 +359,7 @@ def map_blocks(review: Review, figures: ReportFigures, embed: Embed | None) -> I
         if embed is not None:
             page = embed(
                 reviewed.scene,
-                exaggeration=review.exaggeration,
+                exaggeration=reviewed.picture.exaggeration,
                 nodes=min(max(reviewed.picture.grid.shape), 21),
                 loop=review.settings.loop,
                 largest=max(one.statistics.max_um for one in review.scenes),
@@ -378,9 +380,8 @@ def explanation(reviewed: Reviewed) -> Table:
         rows.append((part.key, row.name, value, *numbers))
     remaining = ranked[MOST_ROWS:]
     if remaining:
-        vector = np.sum([part.error_um for part in remaining], axis=0)
-        along = sum(part.along_um for part in remaining)
-        rows.append((f"{len(remaining)} more", "", "", *map(spell_signed, (*vector, along))))
+        total = np.sum([(*part.error_um, part.along_um) for part in remaining], axis=0)
+        rows.append((f"{len(remaining)} more", "", "", *map(spell_signed, total)))
     remainder = (spell_signed(value, 2) for value in terms.remainder_um)
     rows.append(("remainder", "second order", "", *remainder, ""))
     rows.append(("total", "exact chain", "", *map(spell_signed, terms.error_um), ""))
@@ -436,12 +437,11 @@ def differences(review: Review) -> Iterator[Block]:
     first, second = (reviewed.scene for reviewed in review.scenes)
     rows: list[tuple[str, ...]] = []
     for key in dict.fromkeys([*first.parameter_keys, *second.parameter_keys]):
-        a, b = (scene.errors.amplitude(key) for scene in (first, second))
-        shapes = [scene.errors.functions.get(key) for scene in (first, second)]
-        if shapes[0] == shapes[1] or (a == 0.0 and b == 0.0):
-            continue
-        row = parameter(key)
-        rows.append((key, row.name, *map(spell_setting, (a, b, b - a)), row.unit))
+        a, b = first.errors.amplitude(key), second.errors.amplitude(key)
+        same = first.errors.functions.get(key) == second.errors.functions.get(key)
+        if not (same or a == b == 0.0):
+            row = parameter(key)
+            rows.append((key, row.name, *map(spell_setting, (a, b, b - a)), row.unit))
     columns = (
         Column("key"), Column("error"), *number_columns(("A", "B", "B − A"), "s"), Column("unit")
     )  # fmt: skip
@@ -485,7 +485,10 @@ def conventions(review: Review) -> Items:
         for one, words in zip(review.scenes, each if differ else each[:1], strict=False)
         for text in words
     ]
-    loop = review.scenes[0].picture.view.loop
+    loop, factor = (
+        review.scenes[0].picture.view.loop,
+        spell_factor(review.scenes[0].picture.exaggeration),
+    )
     return Items(
         (
             "Error = actual − nominal. Lengths in mm, errors in µm, small angles in µrad.",
@@ -496,8 +499,8 @@ def conventions(review: Review) -> Items:
             f"Loop: {loop}. {LOOPS[loop]}",
             *sentences,
             (
-                f"Displacement is drawn {spell_factor(review.exaggeration)} unless a figure states"
-                " otherwise; the dashed box is nominal."
+                f"Displacement is drawn {factor} unless a figure states otherwise; the dashed box"
+                " is nominal."
             ),
             (
                 "First order in the errors; over a 5 × 5 × 5 grid the exact chain (full rotations,"
@@ -516,15 +519,13 @@ def _reference(scene: Scene) -> str:
 
 def provenance(review: Review, files: Sequence[Path]) -> Iterator[Block]:
     settings = review.settings
+    sampling = f"{settings.samples} machines, {settings.distribution}, seed {settings.seed}"
     rows = [
         ("program", f"warpspace {__version__}"),
         ("made", report_time().strftime("%Y-%m-%d %H:%M UTC")),
         ("with", f"Python {platform.python_version()}, NumPy {np.__version__}"),
         ("grid", f"{settings.grid} nodes per axis"),
-        (
-            "sampling",
-            f"{settings.samples} machines, {settings.distribution}, seed {settings.seed}",
-        ),
+        ("sampling", sampling),
     ]
     texts = [scene_to_toml(one.scene).encode() for one in review.scenes]
     inputs = [

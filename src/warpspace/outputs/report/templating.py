@@ -123,10 +123,12 @@ def render_html(report: Report) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    templates.filters["kind"] = _kind
-    templates.filters["data_uri"] = _data_uri
-    templates.filters["attribute_page"] = _attribute_page
-    templates.filters["table"] = _table_markup
+    templates.filters |= {
+        "kind": _kind,
+        "data_uri": _data_uri,
+        "attribute_page": _attribute_page,
+        "table": _table_markup,
+    }
     return templates.get_template("report.html.j2").render(report=report, policy=POLICY)
 
 
@@ -156,22 +158,17 @@ def render_pdf(report: Report) -> bytes:
         with temporary_folder() as folder:
             template = files("warpspace.outputs.report") / "templates" / TEMPLATE
             (folder / TEMPLATE).write_bytes(template.read_bytes())
+            sections: list[dict[str, Any]] = []
+            for part in report.sections:
+                printed = (block for block in part.blocks if not isinstance(block, Embedded))
+                blocks = [_as_data(block, folder) for block in printed]
+                sections.append({"heading": part.heading, "blocks": blocks})
             data = {
                 "title": report.title,
                 "overline": report.overline,
                 "facts": report.facts,
                 "made": f"{report_time():%Y-%m-%d} · warpspace {__version__}",
-                "sections": [
-                    {
-                        "heading": part.heading,
-                        "blocks": [
-                            _as_data(block, folder)
-                            for block in part.blocks
-                            if not isinstance(block, Embedded)
-                        ],
-                    }
-                    for part in report.sections
-                ],
+                "sections": sections,
             }
             text = json.dumps(data, ensure_ascii=False, allow_nan=False)
             (folder / "report.json").write_text(text, encoding="utf-8")

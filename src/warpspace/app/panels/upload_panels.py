@@ -1,0 +1,397 @@
+"""Sections for uploaded files: import of measured errors, the workpiece, the NC program."""
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from markupsafe import Markup
+
+from warpspace.analysis import description
+from warpspace.analysis.blocks import Block, Curve, Lines, Style, Table
+from warpspace.analysis.options import Grammar, Option, option, typed_word
+from warpspace.analysis.registry import Entry
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, join, tag, upload_button
+from warpspace.app.browser.incoming import index_of
+from warpspace.app.documents.transfers import IN_BOX, upload_text
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.scene_overlays import AT_LINE, moved_place, part_overlay
+from warpspace.app.panels.analysis_panel import ResultKey
+from warpspace.app.panels.block_html import block_html, details_html
+from warpspace.app.panels.file_dialogs import accepted_endings
+from warpspace.app.panels.measurement import MOST_BYTES, FilesPanel, UploadedFile
+from warpspace.app.panels.panel import Context, actions, quiet, setting
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import AppState, PartLook
+from warpspace.app.state.form_values import option_values, read_form
+from warpspace.exceptions import WarpspaceError
+from warpspace.formats import registry
+from warpspace.formats.measured import BACKWARD, FORWARD, UNDIRECTED, ErrorSeries, summary_table
+from warpspace.formats.source import Source
+from warpspace.formats.to_scene import ImportedScene, build_imported_scene
+from warpspace.kinematics import transforms
+from warpspace.machine.axes import is_linear, parameter
+from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
+from warpspace.parts.workpiece import load_workpiece, place_workpiece
+from warpspace.scene.model import Scene
+from warpspace.units import Array
+
+NAME = "import"
+MOST_FILES = 16  # read together
+MOST_CURVES, MOST_POINTS = 12, 400
+SIGNS = {
+    "error": "errors (subtracted by the controller)",
+    "correction": "corrections (added by the controller)",
+}
+DIRECTIONS = {FORWARD: "forward", BACKWARD: "backward", UNDIRECTED: "mean"}
+OPTIONS = {"--axis": "“Axis”", "--sign": "“Sign”", "--variant": "“Variant”", "--format": "“Format”"}
+INTRODUCTION = (
+    "Measured errors or compensation tables of a controller. Changes are previewed before they are"
+    " applied. Files can also be dropped on the page."
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Import(description.Analysis):
+    """Import measured errors, or a compensation table of a controller, into SCENE."""
+
+    name = NAME
+    task = "measure"
+    doing = "reading"
+    makes_scenes = True
+    format: str | None = option(None, "File format, if it is not recognised correctly")
+    axis: Annotated[str, Grammar("X, or AX1=X AX2=Y", typed_word)] = option(
+        "",
+        "X: the axis, if the files do not name it. AX1=X: the axis that a name in the files stands"
+        " for; separate several with blanks",
+    )
+    sign: Literal["error", "correction"] | None = option(
+        None,
+        "Errors or corrections in the table",
+        unset="according to the manual",
+        choice_labels=SIGNS,
+    )
+    variant: str | None = option(None, "Published variant of the format", unset="default")
+    sources: tuple[Source, ...] = ()
+
+    def run(self, scene: Scene, _watch: description.ProgressCallback, /) -> "ImportResult":
+        texts = filter(None, re.split(r"[\s,;]+", self.axis))
+        axis, names = registry.parse_axis_options([*texts])
+        sign_and_variant = self.sign or "", self.variant or ""
+        options = registry.ReadOptions(scene.machine, axis, names, *sign_and_variant)
+        reading = registry.read_errors(self.sources, options, self.format or "")
+        files = ", ".join(source.name for source in self.sources)
+        imported = build_imported_scene(reading, scene, scene.title, files)
+        return ImportResult(files=files, before=scene, reading=reading, imported=imported)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportResult(description.Result):
+    files: str
+    before: Scene
+    reading: registry.Reading
+    imported: ImportedScene
+
+    def changes(self) -> Sequence[description.Change]:
+        return (description.Change(self.files, self.imported.scene),)
+
+    def blocks(self) -> Iterator[Block]:
+        errors = self.reading.imported
+        units = ", ".join(errors.units).replace("um", "µm").replace("urad", "µrad")
+        yield f"{self.reading.format.title} from {self.files}, in {units}."
+        replaced = [key for key in errors.keys if self.before.errors.amplitude(key)]
+        added = [key for key in errors.keys if key not in replaced]
+        effects = [f"replaces {', '.join(replaced)}"] if replaced else []
+        effects += [f"adds {', '.join(added)}"] if added else []
+        yield f"The import {' and '.join(effects) or 'contains no errors'}."
+        yield summary_table(errors)
+        for series in errors.series[:MOST_CURVES]:
+            row = parameter(series.key)
+            unit = "mm" if is_linear(row.axis) else "°"
+            title, curves = f"{series.key} {row.name}", tuple(_curves(series))
+            yield Lines("lines", title, f"{row.axis} [{unit}]", f"[{row.unit}]", curves)
+
+    def caveats(self) -> Iterator[str]:
+        errors, unchanged = self.reading.imported, f"kept from {self.before.name}:"
+        for note in (*errors.assumed, *errors.notes, *self.imported.notes):
+            if not note.startswith("replaced: "):
+                yield _without_options(note.replace(unchanged, "unchanged:"))
+        n_hidden = len(errors.series) - MOST_CURVES
+        if n_hidden > 0:
+            yield f"{n_hidden} more curves are not displayed"
+
+
+def _curves(series: ErrorSeries) -> Iterator[Curve]:
+    at = np.array(series.positions)
+    thin = slice(None, None, max(1, len(at) // MOST_POINTS))
+
+    def curve(name: str, readings: Array, direction: int, style: Style) -> Curve:
+        is_finite, colour = np.isfinite(readings), list(DIRECTIONS).index(direction)
+        return Curve(name, at[is_finite][thin], readings[is_finite][thin], colour, style)
+
+    n_means = 0
+    for direction, name in DIRECTIONS.items():
+        mean = series.mean(direction)
+        if mean is not None:
+            n_means += 1
+            yield curve(name, mean, direction, "line")
+    if len(series.runs) > n_means:
+        yield from (curve("", np.array(run.values), run.direction, "dots") for run in series.runs)
+
+
+def _without_options(text: str) -> str:
+    """Replace names of command options by labels of the page."""
+    for flag, label in OPTIONS.items():
+        text = text.replace(flag, label)
+    return text
+
+
+# --- The section ----------------------------------------------------------------------------------
+
+
+class ImportPanel(FilesPanel):
+    """Files that are read together, their options, and the imported errors."""
+
+    def __init__(self, context: Context) -> None:
+        sentence = "Measured errors, or a compensation table of a controller"
+        super().__init__(context, Entry(NAME, "measure", sentence, f"{__name__}:Import"))
+        context.offer_import = lambda name, content: self.receive(lambda: (name, content))
+
+    def shown_options(self, state: AppState) -> Sequence[Option]:
+        return self._options(state, self.files)
+
+    def _options(self, state: AppState, files: Sequence[UploadedFile]) -> Sequence[Option]:
+        if not files:
+            return ()
+        options = {option.name: option for option in self.options()}
+        names = {option.name: option.title for option in registry.formats()}
+        recognised = _recognised(files)
+        first = recognised.title if recognised is not None else "none, select one"
+        labels = {"choices": tuple(names), "choice_labels": names}
+        options["format"] = replace(options["format"], **labels, unset=f"recognised: {first}")
+        chosen = self.values(state).get("format")
+        kind = registry.find_format(chosen) if chosen in names else recognised
+        if kind is None or kind.tables is None:
+            del options["sign"]
+        if kind is None or not kind.variants:
+            del options["variant"]
+        else:
+            options["variant"] = replace(options["variant"], choices=kind.variants)
+        return list(options.values())
+
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        return {"sources": tuple(file.content for file in self.files)}
+
+    def is_automatic(self, state: AppState) -> bool:
+        return True
+
+    def before_result(self, state: AppState) -> Markup:
+        kind = "" if self.files else "main"
+        upload = upload_button(
+            "Import a file", "files", MAX_UPLOAD_BYTES, accepted_endings(), kind=kind,
+            hint="Files that belong together can be added one after the other",
+        )  # fmt: skip
+        introduction = EMPTY if self.files else tag("p", INTRODUCTION)
+        return introduction + self.files_html() + actions(upload)
+
+    def result_html(self, result: description.Result) -> Markup:
+        return details_html(block for block in result.blocks() if not isinstance(block, str))
+
+    def actions(self, result: description.Result, *, stale: bool) -> Markup:
+        return EMPTY
+
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
+        """Parse a file, together with the present ones if they belong together.
+
+        A single file is accepted even if it cannot be read yet: the section offers the missing
+        options, or another file completes it.
+        """
+        uploaded = UploadedFile(name, registry.open_upload(name, content))
+        present, problem = self.files, None
+        is_applied = self._applied_key[-1:] == (present,)
+        joined = () if is_applied else tuple(file for file in present if file.name != name)
+        state, is_joined, files = self.context.state, False, present
+        scene = state.active_scene()
+        for is_joined in (True, False) if 0 < len(joined) < MOST_FILES else (False,):
+            files = (*joined, uploaded) if is_joined else (uploaded,)
+            try:
+                values = self.values(state) if is_joined else {}
+                analysis = read_form(Import, self._options(state, files), values, scene)
+                sources = tuple(file.content for file in files)
+                replace(analysis, sources=sources).run(scene, description.ignore_progress)
+                break
+            except WarpspaceError as error:
+                problem = error
+        else:
+            if joined and problem is not None:
+                raise problem
+        return partial(self._show, files, is_joined=is_joined)
+
+    def _show(self, files: tuple[UploadedFile, ...], *, is_joined: bool) -> None:
+        self.set_files(files)
+        self.context.post(partial(_unfolded, keeps_forms=is_joined))
+
+    def problem_html(self, state: AppState) -> Markup:
+        return Markup(_without_options(super().problem_html(state)))  # noqa: S704 - escaped before
+
+
+def _recognised(files: Sequence[UploadedFile]) -> registry.Format | None:
+    try:
+        return registry.recognise([file.content for file in files])
+    except WarpspaceError:  # no format, or several
+        return None
+
+
+def _unfolded(state: AppState, *, keeps_forms: bool) -> AppState:
+    """Open the section; options for other files are reset."""
+    page = replace(state.page, task="measure", open=state.page.open | {NAME}, window="")
+    forms = {k: v for k, v in state.forms.items() if keeps_forms or not k.startswith(f"{NAME}.")}
+    return replace(state, page=page, forms=forms)
+
+
+# --- The workpiece and the NC program in the working volume ---------------------------------------
+
+MOST_LETTERS = 200  # of a displayed line
+
+
+class SceneOverlayPanel(FilesPanel):
+    """An uploaded file that is drawn in the working volume: a workpiece or a program."""
+
+    runs_on_open = True
+    most_bytes, what = MAX_UPLOAD_BYTES, "mesh or program"
+    part_fields = ("", "")  # fields of `PartLook`: content and name of the file
+
+    def about(self, state: AppState) -> Markup:
+        raise NotImplementedError
+
+    def result_key(self, state: AppState) -> ResultKey:
+        part = replace(state.part, shown=True, normal=False, moved=False)
+        return (*super().result_key(state), part)
+
+    def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
+        return (*super().body_dependencies(picture), picture.state.part)
+
+    def is_ready(self, state: AppState) -> bool:
+        return getattr(state.part, self.part_fields[0]) is not None
+
+    def before_result(self, state: AppState) -> Markup:
+        content, name = (getattr(state.part, field) for field in self.part_fields)
+        upload = html.upload_button(
+            f"Another {self.name} …" if content else f"{self.title} …", self.name, self.most_bytes,
+            ",".join(IN_BOX[self.name]), kind="" if content else "main",
+            hint=f"At most {self.most_bytes >> 20} MB; files can also be dropped on the page",
+        )  # fmt: skip
+        missing = "is not loaded: links and saved scenes store only its name. Open it again."
+        about = quiet(f"{name} {missing}") if name else EMPTY
+        if content:
+            remove = button("✕", f"{self.name}:remove", kind="link", aria_label=f"Remove {name}")
+            about = tag("p", join((tag("b", name), " ", remove))) + self.about(state)
+        return join((about, self.files_html(), actions(upload)))
+
+    def show(self, content: object, name: str, **changes: Any) -> None:
+        def update(state: AppState) -> AppState:
+            opened = state.page.open | {self.name}
+            state = replace(state, page=replace(state.page, task=self.task, open=opened, window=""))
+            return self.with_content(state, content, name, shown=True, **changes)
+
+        self.context.post(update)
+
+    def with_content(self, state: AppState, content: object, name: str, **changes: Any) -> AppState:
+        """Set or remove the content; the map becomes transparent for it."""
+        self.outcome = None
+        fields = dict(zip(self.part_fields, (content, name), strict=True))
+        part = replace(state.part, **fields, **changes)
+        return edits.with_sight(replace(state, part=part), inside=not part.is_empty)
+
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "remove" and not value:
+            return self.with_content(state, None, "")
+        return super().handle(state, action, value)
+
+
+class PartPanel(SceneOverlayPanel):
+    """A workpiece: its placement, and an inspection of it as machined."""
+
+    part_fields = ("mesh", "name")
+    unsupported = ("place", "predistorted")
+    _sent: tuple[str, bytes] | None = None  # read again with another unit
+
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        (scene_part, _), part = PartLook.of_scene(state.scene), state.part
+        features = state.scene.part.path("features") if part.mesh is scene_part.mesh else None
+        tolerances = next(((file.name, file.content) for file in self.files), None)
+        files = {"features": features, "tolerances": tolerances}
+        return {"place": part.place, "mesh": part.mesh, **files}
+
+    def about(self, state: AppState) -> Markup:
+        turns = (button(f"{axis} 90°", f"{self.name}:turn", axis, kind="choice",
+                        hint=f"Rotate by 90° about the workpiece axis {axis}, in place")
+                 for axis in "xyz")  # fmt: skip
+        return join((
+            actions(tag("span", "Rotate about"), *turns),
+            *(setting(state, f"part.{name}") for name in ("place", "shown", "normal", "moved")),
+            html.upload_button("Tolerances …", self.name, MAX_SCENE_BYTES, ".toml",
+                               hint="Names and tolerances of the features"),
+        ))  # fmt: skip
+
+    def result_html(self, result: description.Result) -> Markup:
+        *_, features = (block for block in result.blocks() if isinstance(block, Table))
+        verdicts = [(name, verdict) for name, *_, verdict, _ in features.rows if verdict]
+        return html.rows(verdicts) + super().result_html(result)
+
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        part = part_overlay(state) if action == "turn" and value in ("x", "y", "z") else None
+        if part is not None:
+            turn = transforms.placed(part.of.middle_mm, 90.0 * np.eye(3)["xyz".index(value)])
+            return replace(state, part=replace(state.part, place=moved_place(part.of, turn)))
+        updated = super().handle(state, action, value)
+        if action == "set.unit" and state.part.mesh and self._sent:
+            sent = self._sent
+            self.receive(lambda: sent)
+        return updated
+
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
+        """Parse tolerances, or a mesh; a mesh of another name is placed at the centre."""
+        if name.lower().endswith(".toml"):
+            text = upload_text(content, name, "tolerance file")
+            return partial(self.set_files, (UploadedFile(name, text),))
+        self._sent, state = (name, content), self.context.state
+        mesh = load_workpiece(name, option_values(state, self.name).get("unit") or None, content)
+        present_place = state.part.place if name == state.part.name else None
+        place = np.round(place_workpiece(mesh, state.standing, present_place).place, 3)
+        return partial(self.show, mesh, name, place=tuple(place.tolist()))
+
+
+class ProgramPanel(SceneOverlayPanel):
+    """A program: its lines and its path in the drawing are linked."""
+
+    most_bytes = MOST_BYTES  # longer programs would delay other tabs
+    part_fields = ("program", "program_name")
+
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        return {"file": state.part.program_name, "text": state.part.program}
+
+    def about(self, state: AppState) -> Markup:
+        line, text = state.forms.get(AT_LINE, ""), (state.part.program or "").splitlines()
+        at = index_of(line, len(text) + 1)
+        if not at:
+            return EMPTY
+        return tag("p", join((tag("b", line), " ", tag("code", text[at - 1][:MOST_LETTERS]))))
+
+    def result_html(self, result: description.Result) -> Markup:
+        def link(line: int) -> Markup:
+            hint = "Show this line in the drawing; a click on the path selects its line"
+            return button(line, f"{self.name}:set.at_line", line, kind="link", hint=hint)
+
+        *tables, worst = (block for block in result.blocks() if isinstance(block, Table))
+        line, *columns = worst.columns
+        shown = ("|E|", "largest contributions")
+        columns = (replace(column, shows=column.heading in shown) for column in columns)
+        narrow = replace(worst, columns=(replace(line, form=link), *columns))
+        return block_html(narrow) + details_html((*tables, worst))
+
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
+        return partial(self.show, content.decode("utf-8-sig", "replace"), name)
