@@ -358,7 +358,7 @@ def map_blocks(review: Review, figures: ReportFigures, embed: Embed | None) -> I
         if embed is not None:
             page = embed(
                 reviewed.scene,
-                exaggeration=reviewed.picture.exaggeration,
+                exaggeration=review.exaggeration,
                 nodes=min(max(reviewed.picture.grid.shape), 21),
                 loop=review.settings.loop,
                 largest=max(one.statistics.max_um for one in review.scenes),
@@ -484,7 +484,7 @@ def conventions(review: Review) -> Items:
         for one, words in zip(review.scenes, each if differ else each[:1], strict=False)
         for text in words
     ]
-    loop, factor = review.settings.loop, spell_factor(review.scenes[0].picture.exaggeration)
+    loop, factor = review.settings.loop, spell_factor(review.exaggeration)
     return Items(
         (
             "Error = actual − nominal. Lengths in mm, errors in µm, small angles in µrad.",
