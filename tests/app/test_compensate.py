@@ -32,6 +32,7 @@ from warpspace.cli.services import draw_compensation
 from warpspace.exceptions import WarpspaceError
 from warpspace.field.grid import build_grid
 from warpspace.formats.compensation.compensate import Compensate, compensate, read_points
+from warpspace.formats.terms import Tables
 from warpspace.kinematics.model import Loop
 from warpspace.outputs.charts.result_charts import compensation_maps
 from warpspace.parts.workpiece import Workpiece
@@ -143,7 +144,8 @@ def test_an_empty_table_leaves_what_is_drawn_without_one(controller, loop):
     held = put(with_reference(START, {"X": 100.0, "Y": -50.0, "Z": -280.0}), "positions.B", "20")
     look = replace(held.look, surface="slices", quantity="orientation")
     plain = replace(held, loop=loop, look=look)
-    bare, picture = map(LIVE.evaluate, (plain, replace(plain, controller=controller.without())))
+    empty = replace(plain, controller=replace(controller, tables=Tables(())))
+    bare, picture = map(LIVE.evaluate, (plain, empty))
     assert np.abs(picture.field.orientation_urad - bare.field.orientation_urad).max() < 0.01
     pairs = [(picture.field, bare.field), *zip(picture.traces, bare.traces, strict=True)]
     cuts = zip(picture.slices, bare.slices, strict=True)

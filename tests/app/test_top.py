@@ -9,9 +9,8 @@ from app.parts import Alone, wait
 from warpspace.app.documents.output_services import Services
 from warpspace.app.documents.scene_file import SceneList, open_link
 from warpspace.app.documents.transfers import unpack
-from warpspace.app.panels import top_bar
+from warpspace.app.panels import page_panels
 from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog
-from warpspace.app.panels.page_panels import COMMANDS, HelpDialog
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
 from warpspace.scene.library import load_scene
@@ -23,7 +22,7 @@ HOSTILE = "<img src=x onerror=alert(1)>.csv"
 
 
 def test_undo_is_there_when_there_is_something_to_undo_and_says_what():
-    bar = Alone(top_bar.TopPanel, STATE)
+    bar = Alone(page_panels.TopPanel, STATE)
     assert 'data-do="page:undo"' not in bar.html
     bar.store.apply(lambda state: state.with_amplitude("EAX", 7.0))
     assert "Undo: roll of X (Ctrl+Z)" in bar.html
@@ -35,7 +34,7 @@ def test_undo_is_there_when_there_is_something_to_undo_and_says_what():
 def test_scenes_are_chosen_by_title_and_escaped():
     hostile = replace(FIRST, name="other", title=HOSTILE, description=HOSTILE)
     scenes = SceneList({scene.title: scene for scene in (FIRST, SECOND, hostile)})
-    window = Alone(top_bar.ScenesDialog, STATE, scenes=scenes)
+    window = Alone(page_panels.ScenesDialog, STATE, scenes=scenes)
     assert "<img" not in window.html
     assert window.html.count('aria-current="true"') == 1
     assert window.do("choose", "nothing of that name").scene is FIRST
@@ -43,12 +42,12 @@ def test_scenes_are_chosen_by_title_and_escaped():
 
 
 def test_every_key_is_there_once_and_none_without_ctrl_changes_the_model():
-    keys = [key for one in COMMANDS for key in one.keys]
-    assert len(keys) == len(set(keys)) == len(top_bar.key_events())
-    for command in COMMANDS:
+    keys = [key for one in page_panels.COMMANDS for key in one.keys]
+    assert len(keys) == len(set(keys)) == len(page_panels.key_events())
+    for command in page_panels.COMMANDS:
         part, _, word = command.event.partition(":")
         if part in ("state", "page") and command.keys and "ctrl" not in command.keys[0]:
-            kinds = {"state": top_bar.StatePanel, "page": top_bar.PagePanel}
+            kinds = {"state": page_panels.StatePanel, "page": page_panels.PagePanel}
             window = Alone(kinds[part], STATE)
             window.part.context.store.apply(lambda state: state.with_amplitude("EAX", 7.0))
             before = replace(window.store.state, exaggeration=None).resulting_scene()
@@ -57,7 +56,7 @@ def test_every_key_is_there_once_and_none_without_ctrl_changes_the_model():
 
 
 def test_commands_are_found_by_words_and_enter_runs_the_first():
-    window = Alone(HelpDialog, STATE)
+    window = Alone(page_panels.HelpDialog, STATE)
     window.store.apply(lambda state: put(state, "page.command", "zero err"))
     assert window.html.count('data-do="help:run"') == 1
     window.do("first", "whatever")

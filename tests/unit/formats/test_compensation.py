@@ -15,8 +15,8 @@ from warpspace.formats.source import source_of_text
 from warpspace.formats.terms import AxisTable, Product
 from warpspace.formats.to_scene import build_imported_scene
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose, error_transform, point_in_branch
-from warpspace.kinematics.model import complete_coordinates
+from warpspace.kinematics.chain import branch_pose, error_transform, nominal_point
+from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.simple import Directional
 from warpspace.machine.errors import ErrorSet, Harmonics, Poly, TableCurve
@@ -246,7 +246,7 @@ def test_constants_of_the_alternative_model_turn_with_the_axis():
     # displacement of the C frame in front of its rotation, taken back behind it
     turned = transforms.inverse(frames) @ nominal
     expected = frames @ displaced @ turned @ transforms.inverse(displaced)
-    point = point_in_branch(base.model, "workpiece", coordinates, base.model.workpiece_point_mm)
+    point = nominal_point(base.model, Loop.WORKPIECE, coordinates)
     shift = transforms.apply(expected, np.array(base.model.workpiece_point_mm)) - point
     assert found == pytest.approx(shift * 1e3, abs=1e-3)
 

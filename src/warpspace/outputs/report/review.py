@@ -130,6 +130,10 @@ class Review:
     # of |E_B − E_A|: the length of second minus first, as vectors, node by node
     difference: Statistics | None
 
+    @property
+    def exaggeration(self) -> float:
+        return self.scenes[0].picture.exaggeration
+
 
 def share_pictures(scenes: Sequence[Scene], settings: ReportSettings) -> tuple[ScenePicture, ...]:
     if not 1 <= len(scenes) <= 2:

@@ -359,7 +359,7 @@ def map_blocks(review: Review, figures: ReportFigures, embed: Embed | None) -> I
         if embed is not None:
             page = embed(
                 reviewed.scene,
-                exaggeration=reviewed.picture.exaggeration,
+                exaggeration=review.exaggeration,
                 nodes=min(max(reviewed.picture.grid.shape), 21),
                 loop=review.settings.loop,
                 largest=max(one.statistics.max_um for one in review.scenes),
@@ -485,10 +485,8 @@ def conventions(review: Review) -> Items:
         for one, words in zip(review.scenes, each if differ else each[:1], strict=False)
         for text in words
     ]
-    loop, factor = (
-        review.scenes[0].picture.view.loop,
-        spell_factor(review.scenes[0].picture.exaggeration),
-    )
+    loop = review.scenes[0].picture.view.loop
+    factor = spell_factor(review.exaggeration)
     return Items(
         (
             "Error = actual − nominal. Lengths in mm, errors in µm, small angles in µrad.",
