@@ -67,7 +67,7 @@ def compute_dimensions(chain: Chain) -> StarterDimensions:
         {**_steps(tool, horizontal=horizontal), **_steps(workpiece, horizontal=horizontal)},
         dict.fromkeys(first, HORIZONTAL_DEG),
         travel,
-        dict.fromkeys(chain.workpiece, -1),
+        {axis: -1 for axis in chain.workpiece if is_linear(axis)},
         ranges,
         ((radius, 0.0, 0.0), _turned(rim) if horizontal else rim),
     )
