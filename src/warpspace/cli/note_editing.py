@@ -68,6 +68,7 @@ def _add_note(name: str, path: str, point: str | None, *, force: bool, **about: 
         if not path.endswith(".toml"):
             expected = "expected a .toml file (-o FILE.toml); bundled scenes are not changed"
             raise OptionError(f"{path}: {expected}")
+        about["loop"] = about["loop"] or scene.default_loop
         note = Note(at=at, **about)
         warn_outside_travel(scene.machine, note.at)
         note = replace(note, numbers=note_numbers(scene, [note])[0])

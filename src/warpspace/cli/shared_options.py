@@ -79,8 +79,8 @@ placed_option = click.option(
 loop_option = choice_option(
     "--loop",
     LOOPS,
-    "Structural loop: tool point, workpiece point, or tool relative to workpiece.  [relative where"
-    " an axis carries the workpiece, else tool]",
+    "Structural loop: tool point, workpiece point, or tool relative to workpiece.  [tool; relative"
+    " with --placed]",
     None,
 )
 direction_option = click.option(

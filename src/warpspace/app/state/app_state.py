@@ -465,7 +465,7 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
         positions,
         start,
         scene.exaggeration,
-        loop=scene.default_loop,
+        loop=start_loop(scene),
         placed=scene.placed,
         specification=Specification(START_UM if scene.limit_um is None else scene.limit_um),
         tolerances=scene.tolerances,
@@ -476,3 +476,9 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
         notes=notes,
     )
     return replace(state, **changes)
+
+
+def start_loop(scene: Scene) -> Loop:
+    """Return the initial loop: relative where only axes of the workpiece have errors, else tool."""
+    axes = {parameter(key).axis for key in scene.parameter_keys if scene.errors.amplitude(key)}
+    return Loop.RELATIVE if axes and axes.isdisjoint(scene.machine.chain.tool) else Loop.TOOL
