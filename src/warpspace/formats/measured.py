@@ -238,7 +238,7 @@ def _converted(
 
 def _reading_shares(machine: Machine, row: Parameter) -> Mapping[str, float]:
     sensed = "XYZ"[row.direction]
-    if not is_linear(row.axis) or sensed not in machine.axes:
+    if not is_linear(row.axis) or not {row.axis, sensed} <= machine.axes.keys():
         return {row.key: 1.0}
     return reading_errors(machine, row.axis, sensed, angle=row.is_rotation)
 

@@ -251,7 +251,7 @@ def with_placement(scene: Scene, loop: Loop | str | None, *, placed: bool = True
     """Return a scene with a best-fit placement of the workpiece, if `placed`."""
     if placed and loop and loop != Loop.RELATIVE:
         raise OptionError(
-            f"placed: the {loop} loop does not contain the placement of the workpiece; expected"
+            f"{{placed}}: the {loop} loop does not contain the placement of the workpiece; expected"
             f" loop {Loop.RELATIVE}"
         )
     return replace(scene, placed=True) if placed else scene

@@ -485,7 +485,7 @@ def conventions(review: Review) -> Items:
         for one, words in zip(review.scenes, each if differ else each[:1], strict=False)
         for text in words
     ]
-    loop = review.scenes[0].picture.view.loop
+    loop = review.settings.loop or review.scenes[0].picture.view.loop
     factor = spell_factor(review.exaggeration)
     return Items(
         (
