@@ -44,15 +44,15 @@ Costs: TypeAlias = Annotated[
 
 @dataclass(frozen=True, kw_only=True)
 class Allocate(KeptLimit):
-    """Find the widest tolerances that keep a limit of |E|.
+    """Find the widest tolerances that meet a limit of |E|.
 
-    Of the machines drawn from the new tolerances of SCENE the wanted share keeps |E| ≤ LIMIT, at
-    the least cost: a half width w of an error costs 1/w, or what --cost says over w. A tolerance of
-    0 holds its error and stays 0; centres stay; half widths are rounded down to three digits and at
-    most 1000 µm or µrad. The limit is kept everywhere in the volume, unless --over says otherwise,
-    and by so many of the machines that the lower end of the 95 % interval (Wilson) is the wanted
-    share. `warpspace montecarlo FILE --limit LIMIT --over max` has the same figure; another
-    --seed has other machines.
+    The required share of the machines within the new tolerances of SCENE has |E| ≤ LIMIT, at the
+    least cost: a half width w of an error costs 1/w, or the number of --cost divided by w. A
+    tolerance of 0 remains 0, and centres are unchanged; half widths are rounded down to three
+    digits and are at most 1000 µm or µrad. The limit applies everywhere in the volume, unless
+    --over selects another evaluation; the lower end of the 95 % interval (Wilson) of the share
+    meets the required one. `warpspace montecarlo FILE --limit LIMIT --over max` gives the same
+    figure; another --seed samples other machines.
     """
 
     name = "allocate"

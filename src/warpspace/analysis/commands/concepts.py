@@ -74,11 +74,11 @@ class Concept:
 class Concepts(machine_sampling.KeptLimit):
     """Compare machines before one of them is built.
 
-    Machines of each SCENE are drawn from the same tolerances: those of the first one for
-    translations, rotations and squarenesses. Printed are mean, 95 % and largest |E|, how many
-    machines keep the limit, and the three errors that add most to the variance of E. Errors are
-    absolute: no point is held still, whatever a scene says. `warpspace montecarlo` and
-    `warpspace contributions` give more of each machine.
+    Machines of each SCENE are sampled within the same tolerances: those of the first one for
+    translations, rotations and squareness. The output contains mean, P95 and largest |E|, the share
+    of machines within the limit, and the three errors that contribute most to the variance of E.
+    Errors are absolute; the reference point of a scene is ignored. `warpspace montecarlo` and
+    `warpspace contributions` evaluate one machine in detail.
     """
 
     name = "concepts"
@@ -92,7 +92,7 @@ class Concepts(machine_sampling.KeptLimit):
     )
     limit_um: float | None = option(
         None,
-        "Limit of |E|, for the probability that it is kept",
+        "Limit of |E|, for the share of machines within it",
         unit="µm",
         low=LIMIT_UM[0],
         high=LIMIT_UM[1],

@@ -101,17 +101,17 @@ class SweepPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class MonteCarlo(SampledMachines):
-    """Show how large |E| gets on machines within tolerance.
+    """Evaluate the distribution of |E| of machines within tolerance.
 
     Machines are sampled from the tolerances of each SCENE (a folder stands for the scenes in it;
     several are printed as a table); |E| is the length of the error in µm.
-    Each parameter is drawn once per machine and holds everywhere; a component error is the value it
-    has at the point looked at. Tool and relative loop: points uniform in the working volume, rotary
-    axes at their place in the scene. Workpiece loop: points uniform in the volume of the largest
+    Each parameter is sampled once per machine and is constant; a component error has this value at
+    the evaluated point. Tool and relative loop: points uniform in the working volume, rotary axes
+    at their positions in the scene. Workpiece loop: points uniform in the volume of the largest
     workpiece, its rotary axes uniform over their travel.
 
-    With --tolerance there is a row for every combination of half widths, of the same seed, so that
-    rows differ by their tolerances only.
+    With --tolerance there is a row for every combination of half widths. All rows have the same
+    seed, so that they differ by their tolerances only.
 
     Quantiles are exact up to a million samples; beyond, from a histogram with steps of 0.002 %. The
     numbers of a seed are the same on any number of workers, processes or machines of a cluster.
@@ -131,7 +131,7 @@ class MonteCarlo(SampledMachines):
     grid: int = option(DEFAULT_NODES, "Nodes per axis for --over max|mean", low=2, high=101)
     limit_um: float | None = option(
         None,
-        "Limit of |E|, for the probability that a machine keeps it",
+        "Limit of |E|, for the share of machines within it",
         unit="µm",
         low=0.0,
         flag="--limit",
