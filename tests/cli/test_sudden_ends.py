@@ -234,6 +234,7 @@ main()
 """
 
 
+@pytest.mark.nightly
 def test_view_heeds_a_signal_that_the_system_gives_to_another_thread(tmp_path):
     process = start(tmp_path, "view", "--no-browser", code=SIGNALLED_THREAD)
     assert process.wait(30) in (0, 128 + signal.SIGTERM)

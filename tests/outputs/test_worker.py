@@ -18,6 +18,7 @@ pytestmark = [pytest.mark.render, pytest.mark.usefixtures("renderer")]
 SMALL = FigureSettings(size=(400, 300), grid=3)
 
 
+@pytest.mark.nightly
 def test_a_crash_loses_one_figure_only():
     scene = load_scene("dvf5000_first")
     with FigureWorker() as worker:

@@ -1,5 +1,7 @@
 """Readings, tables and loops mean on every machine what a simulated one of rigid bodies does."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,7 +15,7 @@ from warpspace.bench.base import run_test
 from warpspace.bench.data import parse_table
 from warpspace.bench.kinds.positioning import Positioning
 from warpspace.bench.kinds.straightness import Squareness, Straightness
-from warpspace.formats.compensation.compensate import Compensate
+from warpspace.formats.compensation.compensate import Compensate, compensate
 from warpspace.formats.registry import ReadOptions, read_errors
 from warpspace.formats.source import source_of_text
 from warpspace.formats.to_scene import build_imported_scene
@@ -185,8 +187,9 @@ GRIDLESS = ("linuxcnc-matrix", "marlin", "klipper")
 def test_a_table_leaves_what_it_says(machine, name, placed):
     scene = scene_of(machine)
     options = Compensate(formats=(name,), loop="relative", placed=placed)
-    found = options.run(scene, ignore)
-    nodes = machine.nodes(5)
+    placed_scene = replace(scene, placed=placed)
+    found = compensate(placed_scene, options, 7)
+    nodes = machine.nodes(4)
     positions = {axis: np.array([q[axis] for q in nodes]) for axis in scene.machine.axes}
     moves = found.controller.moves(positions)
     by_node = np.stack([np.broadcast_to(move, len(nodes)) for move in moves.values()], -1)
