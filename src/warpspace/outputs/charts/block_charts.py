@@ -37,7 +37,8 @@ def on_ground(theme: Theme) -> Generator[None]:
         _THEME.reset(token)
 
 
-ground = _THEME.get
+def ground() -> Theme:
+    return _THEME.get()
 
 
 def style() -> Any:
