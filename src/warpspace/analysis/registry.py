@@ -77,7 +77,7 @@ _BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
     ("compensate", "improve", "formats.compensation.compensate:Compensate",
      "Write a compensation table and report the residual error."),
     ("montecarlo", "design", "analysis.commands.montecarlo:MonteCarlo",
-     "Evaluate the distribution of |E| of machines within tolerance."),
+     "Sample machines within tolerance: distribution of |E|."),
     ("allocate", "design", "analysis.commands.allocate:Allocate",
      "Find the widest tolerances that meet a limit of |E|."),
     ("concepts", "design", "analysis.commands.concepts:Concepts",

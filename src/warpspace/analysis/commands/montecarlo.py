@@ -101,7 +101,7 @@ class SweepPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class MonteCarlo(SampledMachines):
-    """Evaluate the distribution of |E| of machines within tolerance.
+    """Sample machines within tolerance: distribution of |E|.
 
     Machines are sampled from the tolerances of each SCENE (a folder stands for the scenes in it;
     several are printed as a table); |E| is the length of the error in µm.
