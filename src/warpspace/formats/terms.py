@@ -209,7 +209,7 @@ def _tool_side_machine(tables: Tables) -> Machine:
         else:
             parts = (term.first, term.second) if isinstance(term, Product) else (term,)
             axes |= {axis for part in parts for axis in (part.source, part.target)}
-    return build_machine(f"wF{''.join(sort_axes(axes))}t")
+    return build_machine(f"wF{''.join(sort_axes(axes or 'X'))}t")  # a chain has an axis
 
 
 def _factors(machine: Machine, moving: str, target: str) -> dict[str, float]:

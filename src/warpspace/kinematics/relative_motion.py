@@ -6,8 +6,6 @@ produce a reading are found by their effect on it, whatever the side, the sense 
 axes.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from warpspace.exceptions import OptionError, UnknownNameError
@@ -123,13 +121,3 @@ def angle_change(machine: Machine, key: str, first: str, second: str) -> float:
     cosine = directions[0] @ directions[1]
     change = -(turns[0] @ directions[1] + directions[0] @ turns[1])
     return float(change / np.sqrt(1.0 - cosine**2))
-
-
-def from_readings(
-    readings: Mapping[str, Array], machine: Machine, moving: str, sensed: str
-) -> dict[str, Mapping[str, Array]]:
-    """Convert readings by name to the errors that produce them, by parameter and name."""
-    return {
-        key: {name: share * values for name, values in readings.items()}
-        for key, share in reading_errors(machine, moving, sensed).items()
-    }

@@ -46,7 +46,8 @@ class MovedPoints:
         at, point_mm = self.coordinates, self.point_mm
         field = evaluate_exact(self.model, errors, at, View(self.loop), point_mm)
         error_um = field.error_um
-        if self.loop is Loop.RELATIVE:
+        carried = self.model.machine.chain.workpiece
+        if self.loop is Loop.RELATIVE and any(parameter(key).axis in carried for key in errors):
             values = error_values(self.model, errors, at)
             nominal, actual = (
                 branch_pose(self.model, "workpiece", at, rotated)[..., :3, :3]
