@@ -92,28 +92,32 @@ def check_page(tab):
     assert max(width / (free[2] - free[0]), height / (free[3] - free[1])) > 0.5
 
 
+def camera(tab):
+    """The camera of the session of a page, which may have connected anew."""
+    return tab.session.context.camera
+
+
 def test_nothing_is_covered_and_the_box_fills_its_room_unless_it_was_turned(open_tab):
     tab = open_tab(size=(1024, 768))
-    camera = tab.session.context.camera
     check_page(tab)
-    start = camera.remember()
+    start = camera(tab).remember()
     tab.page.set_viewport_size({"width": 1600, "height": 1000})
-    tab.until(lambda: not np.allclose(camera.remember().position, start.position, atol=0.1))
+    tab.until(lambda: not np.allclose(camera(tab).remember().position, start.position, atol=0.1))
     check_page(tab)
     room = tab.page.evaluate(BOXES)["room"]
     x, y = (room[0] + room[2]) / 2, (room[1] + room[3]) / 2
-    filled = camera.remember()
+    filled = camera(tab).remember()
     tab.page.mouse.move(x, y)
     tab.page.mouse.down()
     tab.page.mouse.move(x + 80, y + 20, steps=4)
     tab.page.mouse.up()
-    tab.until(lambda: not np.allclose(camera.remember().position, filled.position, atol=0.1))
-    turned = tab.still(lambda: camera.remember().position)
-    told = camera.reported_room
+    tab.until(lambda: not np.allclose(camera(tab).remember().position, filled.position, atol=0.1))
+    turned = tab.still(lambda: camera(tab).remember().position)
+    told = camera(tab).reported_room
     tab.page.set_viewport_size({"width": 1280, "height": 720})
-    tab.until(lambda: camera.reported_room != told)
+    tab.until(lambda: camera(tab).reported_room != told)
     settled(tab)
-    assert np.allclose(camera.remember().position, turned, atol=1e-3)
+    assert np.allclose(camera(tab).remember().position, turned, atol=1e-3)
 
 
 def bars_agree(tab):

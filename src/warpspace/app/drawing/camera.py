@@ -84,6 +84,8 @@ VIEWS: Mapping[str, Direction] = {**model.VIEWS, "top": (0.0, -STEEPEST, 1.0)}
 """Directions from the target towards the camera."""
 MOVED = 1e-3
 """Smallest movement of a camera by hand, relative to its distance."""
+PLACEMENTS = 12
+"""Placements by the program that are not mistaken for movements by hand."""
 _ROUNDS = 8
 Vector = tuple[float, float, float]
 
@@ -153,7 +155,7 @@ class TabCamera:
         self.wanted: CameraMemory | None = None
         self.view, self.orthographic = "iso", False  # a key of `VIEWS`, the telephoto lens
         self.reported_room: Room | None = None
-        # the latest ones, since a page may report an earlier one
+        # several, since a slow page reports earlier ones late
         self._placements: tuple[CameraMemory, ...] = ()
 
     def choose(
@@ -221,7 +223,7 @@ class TabCamera:
         before = self.remember()
         self._clip(fitted, points)
         self._stand_at(fitted)
-        self._placements = (*self._placements[-1:], before, self.remember())
+        self._placements = (*self._placements[-PLACEMENTS:], before, self.remember())
 
     def remember(self) -> CameraMemory:
         camera = self._camera
