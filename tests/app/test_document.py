@@ -10,6 +10,7 @@ from urllib.parse import parse_qsl, urlencode
 import pytest
 
 from app.hostile import upload
+from products import pairwise
 from warpspace.app.documents import transfers
 from warpspace.app.documents.scene_file import (
     MOST_OPENED,
@@ -274,8 +275,7 @@ PINNED = compare.pinned_side(START.with_amplitude("EXX", 3.0))
 COMPARED = [Side(), PINNED, *map(compare.scene_side, KNOWN_SCENES)]
 
 
-@pytest.mark.parametrize("a", COMPARED)
-@pytest.mark.parametrize("b", COMPARED)
+@pytest.mark.parametrize(("a", "b"), pairwise(COMPARED, COMPARED, together=1))
 def test_link_and_file_give_the_identical_comparison(a, b):
     for shown, ghost in (("a", True), ("b", False), ("difference", True)):
         comparison = Comparison(a, b, shown, ghost=ghost, pinned=PINNED)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from app.parts import LIVE, Alone, lone_part, wait
+from products import first
 from warpspace.analysis.commands.distance import Distance
 from warpspace.analysis.description import ignore_progress
 from warpspace.analysis.registry import entries
@@ -71,7 +72,7 @@ def test_a_trace_in_front_of_the_box_is_what_a_click_on_it_means():
     assert hits > 20
 
 
-@pytest.mark.parametrize("name", scene_names())
+@pytest.mark.parametrize("name", first(*scene_names()))
 def test_a_node_is_asked_about_where_it_is_drawn(name):
     picture = LiveModel().evaluate(replace(start_state(load_scene(name)), nodes=3))
     grid = picture.grid

@@ -21,7 +21,7 @@ SCRIPTS = sorted(p.stem for p in EXAMPLES.glob("*.py") if "write_figure(" in p.r
 
 @pytest.mark.render
 @pytest.mark.usefixtures("renderer")
-@pytest.mark.parametrize("name", [*SCRIPTS, "own_plotter", *first(*WRITES)])
+@pytest.mark.parametrize("name", [*first(*SCRIPTS), "own_plotter", *first(*WRITES)])
 def test_example(name, tmp_path, monkeypatch):
     target = tmp_path if name in WRITES else tmp_path / f"{name}.png"
     monkeypatch.setattr(sys, "argv", [name, str(target)])

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.text import Text
 from PIL import Image
 
-from products import pairwise
+from products import first, pairwise
 from warpspace import load_scene, scene_names
 from warpspace.exceptions import OptionError
 from warpspace.machine.errors import ToleranceSet
@@ -189,7 +189,7 @@ def test_error_curves_have_no_empty_panels(name, panels):
     assert sum(text.startswith(("translation of", "rotation of")) for text in texts) == panels
 
 
-@pytest.mark.parametrize("name", ["gains", "montecarlo", "ballbar"])
+@pytest.mark.parametrize("name", first("gains", "montecarlo", "ballbar"))
 def test_charts_stand_on_a_dark_ground_with_light_ink(name):
     settings = [FigureSettings(size=(900, 700), dark=dark) for dark in (True, False)]
     pictures = (io.BytesIO(render_figure(name, [FIRST], one, "png")) for one in settings)

@@ -58,7 +58,7 @@ def random_scene(seed: int) -> Scene:
     return parse_scene("\n".join(text), "random")
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(100, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("count", [6, pytest.param(100, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("tcp", ["always", "never"])
 def test_random_machines_cut_the_nominal_points(tcp: str, count: int):
     for seed in range(count):
