@@ -6,8 +6,10 @@ import pytest
 from physical_machine import Body, PhysicalMachine, with_errors
 from warpspace.analysis.commands.form import Form
 from warpspace.analysis.commands.line import Line
+from warpspace.analysis.statistics import statistics
 from warpspace.bench.base import run_test
 from warpspace.bench.kinds.straightness import Squareness
+from warpspace.field.grid import build_grid
 from warpspace.formats.compensation.compensate import Compensate
 from warpspace.formats.registry import ReadOptions, read_errors
 from warpspace.formats.source import source_of_text
@@ -113,3 +115,10 @@ def test_a_table_is_exact_on_a_part_that_its_own_errors_incline():
         remaining = simulated.corrected_um(q, {axis: float(at) for axis, at in moves.items()})
         assert np.abs(remaining).max() < 0.01
     assert found.after_statistics.max_um < 0.01 < 1000.0 < found.before_statistics.max_um
+
+
+def test_the_default_loop_of_a_moving_table_is_that_of_the_part():
+    scene = load_scene("machine_fixed_spindle")
+    nodes = build_grid(scene.model, scene.workspace).coordinates
+    assert statistics(evaluate(scene), nodes).mean_um == pytest.approx(17.1, abs=0.05)
+    assert statistics(evaluate(scene, loop="tool")).max_um == 0.0

@@ -143,8 +143,9 @@ class Scene:
 
     @property
     def default_loop(self) -> Loop:
-        """Tool relative to workpiece where the placement of the workpiece is fitted; else tool."""
-        return Loop.RELATIVE if self.placed else Loop.TOOL
+        """Tool relative to workpiece where that is placed or moved by a linear axis; else tool."""
+        moved = any(axes.is_linear(axis) for axis in self.machine.chain.workpiece)
+        return Loop.RELATIVE if self.placed or moved else Loop.TOOL
 
     def view(self, loop: Loop | None = None, frame: str = "machine") -> View:
         """Return the view of the scene for a loop, with the reference of the scene."""
@@ -178,9 +179,10 @@ def evaluate(
     grid : int or sequence of int, (3,), optional
         Nodes per axis of the working volume; 21 by default.
     loop : Loop or str, optional
-        "tool", "workpiece" or "relative"; by default relative for a placed scene, else tool. At
-        points the workpiece loop takes the scene's functional workpiece point; over the grid the
-        workpiece points that nominally coincide with the nodes.
+        "tool", "workpiece" or "relative"; by default relative for a placed scene and where a
+        linear axis moves the workpiece, else tool. At points the workpiece loop takes the scene's
+        functional workpiece point; over the grid the workpiece points that nominally coincide with
+        the nodes.
     exact : bool, optional
         Full rotations and all products instead of the first order.
     frame : str, optional

@@ -479,6 +479,7 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
 
 
 def start_loop(scene: Scene) -> Loop:
-    """Return the initial loop: relative where only axes of the workpiece have errors, else tool."""
+    """Return the default loop, or relative where only axes of the workpiece have errors."""
     axes = {parameter(key).axis for key in scene.parameter_keys if scene.errors.amplitude(key)}
-    return Loop.RELATIVE if axes and axes.isdisjoint(scene.machine.chain.tool) else Loop.TOOL
+    only_table = bool(axes) and axes.isdisjoint(scene.machine.chain.tool)
+    return Loop.RELATIVE if only_table else scene.default_loop
