@@ -6,7 +6,7 @@ import pytest
 from physical_machine import Body, PhysicalMachine, with_errors
 from warpspace.analysis.commands.form import Form
 from warpspace.analysis.commands.line import Line
-from warpspace.analysis.statistics import statistics
+from warpspace.analysis.statistics import volume_statistics
 from warpspace.bench.base import run_test
 from warpspace.bench.kinds.straightness import Squareness
 from warpspace.field.grid import build_grid
@@ -119,6 +119,6 @@ def test_a_table_is_exact_on_a_part_that_its_own_errors_incline():
 
 def test_the_default_loop_of_a_moving_table_is_that_of_the_part():
     scene = load_scene("machine_fixed_spindle")
-    nodes = build_grid(scene.model, scene.workspace).coordinates
-    assert statistics(evaluate(scene), nodes).mean_um == pytest.approx(17.1, abs=0.05)
-    assert statistics(evaluate(scene, loop="tool")).max_um == 0.0
+    grid = build_grid(scene.model, scene.workspace)
+    assert volume_statistics(evaluate(scene), grid).mean_um == pytest.approx(17.1, abs=0.05)
+    assert volume_statistics(evaluate(scene, loop="tool"), grid).max_um == 0.0
