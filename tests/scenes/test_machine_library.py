@@ -177,8 +177,8 @@ def test_machines_move_like_those_of_linuxcnc(machine, forward):
     rng, zero = np.random.default_rng(3), dict.fromkeys(machine.axes, 0.0)
     # their x, y and z count from the table
     start = dict(zip("XYZ", tip(machine, **zero), strict=True))
-    # their angles carry the tool to the workpiece: ours of a table are opposite
-    tables = {name for name in machine.chain.workpiece if not machine.axes[name].is_linear}
+    # their angles turn the tool relative to the workpiece, as in ISO 841
+    tables = {name for name in machine.chain.workpiece if machine.sense(name) < 0}
 
     def place(at):
         theirs = {q: -at[q] if q in tables else at[q] + start.get(q, 0.0) for q in at}

@@ -318,15 +318,17 @@ def scene_notes(machine: Machine, workspace: Workspace, errors: ErrorSet) -> tup
 
 def _direction_notes(machine: Machine) -> Iterator[str]:
     for name, axis in machine.axes.items():
-        if not axis.is_linear or machine.sense(name) > 0:
+        if machine.sense(name) > 0:
             continue
         setting = f"machine.direction.{name} = {axis.direction}"
+        verb = "moves the tool towards" if axis.is_linear else "turns the tool about"
+        effect = f"positive {name} {verb} −{name} over the workpiece, against ISO 841"
         if axis.direction_given:
-            yield f"{setting} is against ISO 841"
+            yield f"{setting}: {effect}"
         else:
             yield (
-                f"{setting} by default: positive {name} moves the tool towards −{name} over the"
-                " workpiece, against ISO 841; expected −1, or an explicit 1 if the machine does so"
+                f"{setting} by default: {effect}; expected −1, or an explicit 1 if the machine"
+                " does so"
             )
 
 

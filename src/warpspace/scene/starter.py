@@ -67,7 +67,7 @@ def compute_dimensions(chain: Chain) -> StarterDimensions:
         {**_steps(tool, horizontal=horizontal), **_steps(workpiece, horizontal=horizontal)},
         dict.fromkeys(first, HORIZONTAL_DEG),
         travel,
-        {axis: -1 for axis in chain.workpiece if is_linear(axis)},
+        dict.fromkeys(chain.workpiece, -1),
         ranges,
         ((radius, 0.0, 0.0), _turned(rim) if horizontal else rim),
     )
