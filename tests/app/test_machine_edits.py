@@ -356,7 +356,8 @@ def test_another_chain_keeps_what_belongs_to_axes_that_stay():
 def test_a_linear_axis_that_changes_sides_moves_the_tool_over_the_workpiece_as_before():
     there = edit("chain wYBFXZt")
     assert [there.machine.axes[axis].direction for axis in "XYZB"] == [1, -1, 1, 1]
-    assert there.notes == ()
+    (note,) = there.notes
+    assert note.startswith("machine.direction.B = 1 by default: positive B turns the tool about −B")
     back = edit("chain wBFXYZt", there)
     assert {axis.direction for axis in back.machine.axes.values()} == {1}
     assert edit("chain wUBFXYZt").machine.axes["U"].direction == -1

@@ -9,6 +9,8 @@ from warpspace.analysis.commands.line import Line
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.bench.base import run_test
 from warpspace.bench.kinds.straightness import Squareness
+from warpspace.calibration.calibrate import Calibrate, calibrate
+from warpspace.calibration.registry import parse_readings
 from warpspace.field.grid import build_grid
 from warpspace.formats.compensation.compensate import Compensate
 from warpspace.formats.registry import ReadOptions, read_errors
@@ -122,3 +124,23 @@ def test_the_default_loop_of_a_moving_table_is_that_of_the_part():
     grid = build_grid(scene.model, scene.workspace)
     assert volume_statistics(evaluate(scene), grid).mean_um == pytest.approx(17.1, abs=0.05)
     assert volume_statistics(evaluate(scene, loop="tool"), grid).max_um == 0.0
+
+
+R_TEST = """angle_deg,x_um,y_um,z_um
+0,30.35,-23.625,1.5738
+25,30.35,-23.625,1.6586
+50,30.35,-23.625,1.4325
+75,30.35,-23.625,0.9377
+100,30.35,-23.625,0.2669
+125,30.35,-23.625,-0.4541
+150,30.35,-23.625,-1.0902
+"""
+"""Readings of rigid bodies: a table B that turns as in ISO 841, with the errors below."""
+
+
+def test_an_r_test_of_a_table_that_turns_as_in_iso_841_has_its_errors():
+    errors = {"EX0B": 20.0, "EZ0B": 15.0, "EA0B": 25.0, "EC0B": -30.0}
+    kind = "r-test:axis=B:ball=40,345,15"
+    scene = machine("horizontal_b_table")
+    found = calibrate(scene, [parse_readings(R_TEST, "r", scene, kind)], Calibrate(fit=(*errors,)))
+    assert {row.key: row.value for row in found.parameters} == pytest.approx(errors, abs=0.02)

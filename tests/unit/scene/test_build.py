@@ -140,8 +140,13 @@ def test_rotary_axes_span_the_volume_of_a_robot():
 
 
 def test_a_direction_against_iso_841_is_remarked_on_again_when_it_was_saved():
-    scene = parse_scene('[machine]\nchain = "wCYFXZt"\ndirection.Y = 1\n', "x")
-    assert scene.notes == ("machine.direction.Y = 1 is against ISO 841",)
+    text = '[machine]\nchain = "wCYFXZt"\ndirection = { Y = 1, C = 1 }\n'
+    scene = parse_scene(text, "x")
+    effects = {"Y": "moves the tool towards −Y", "C": "turns the tool about −C"}
+    assert scene.notes == tuple(
+        f"machine.direction.{axis} = 1: positive {axis} {effect} over the workpiece, against ISO 841"
+        for axis, effect in effects.items()
+    )
     assert parse_scene(scene_to_toml(scene), "x").notes == scene.notes
 
 
