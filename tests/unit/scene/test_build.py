@@ -144,8 +144,8 @@ def test_a_direction_against_iso_841_is_remarked_on_again_when_it_was_saved():
     scene = parse_scene(text, "x")
     effects = {"Y": "moves the tool towards −Y", "C": "turns the tool about −C"}
     assert scene.notes == tuple(
-        f"machine.direction.{axis} = 1: positive {axis} {effect} over the workpiece, against ISO 841"
-        for axis, effect in effects.items()
+        f"machine.direction.{on} = 1: positive {on} {effect} over the workpiece, against ISO 841"
+        for on, effect in effects.items()
     )
     assert parse_scene(scene_to_toml(scene), "x").notes == scene.notes
 
