@@ -144,3 +144,16 @@ def test_an_r_test_of_a_table_that_turns_as_in_iso_841_has_its_errors():
     scene = machine("horizontal_b_table")
     found = calibrate(scene, [parse_readings(R_TEST, "r", scene, kind)], Calibrate(fit=(*errors,)))
     assert {row.key: row.value for row in found.parameters} == pytest.approx(errors, abs=0.02)
+
+
+def test_readings_that_fit_either_sense_of_a_table_are_asked_about(tmp_path):
+    file = tmp_path / "r.csv"
+    file.write_text(R_TEST, "utf-8")
+    kind = "r-test:axis=B:ball=40,345,15"
+    asked = Calibrate(data=(str(file),), kinds=(kind,), fit=("EX0B", "EZ0B", "EA0B", "EC0B"))
+    (note,) = (
+        note
+        for note in asked.run(machine("horizontal_b_table"), lambda _: None).notes
+        if note.startswith("B may turn in the other sense")
+    )
+    assert "machine.direction.B = 1" in note

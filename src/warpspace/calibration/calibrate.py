@@ -1,6 +1,6 @@
 """Calibration: least-squares fit of the error parameters of a machine to measured data."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal, TypeAlias
 
@@ -35,10 +35,13 @@ from warpspace.calibration.next_best import find_separating, next_best, observab
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import read_readings
 from warpspace.calibration.solve import CheckCancelled, never_cancelled, read_keys, rms_mm
-from warpspace.exceptions import OptionError
+from warpspace.exceptions import OptionError, SceneError
 from warpspace.scene.model import Scene
+from warpspace.units import UM_PER_MM
 
 MAX_NEXT = 10
+AS_WELL = 1.2  # residuals in the other sense of an axis, relative to those in its own, at most
+NO_RESIDUAL_MM = 1e-4
 Budget: TypeAlias = Annotated[Instrument, Grammar("NAME|FILE.toml", load_instrument, is_file=True)]
 
 
@@ -134,7 +137,44 @@ class Calibrate(Analysis):
                 f"{{frame}} {self.frame}: no file holds error vectors ({{kinds}} points, tracker)"
             )
         count = len(self.data)
-        return self.fit_readings(scene, sets[:count], sets[count:], lambda: watch(0.0))
+        found = self.fit_readings(scene, sets[:count], sets[count:], lambda: watch(0.0))
+        senses = self._sense_notes(scene, sets[:count], kinds, found, lambda: watch(0.0))
+        return replace(found, notes=(*found.notes, *senses))
+
+    def _sense_notes(
+        self,
+        scene: Scene,
+        sets: Sequence[Readings],
+        kinds: Sequence[str | None],
+        found: Calibration,
+        check_cancelled: CheckCancelled,
+    ) -> Iterator[str]:
+        """Fit readings of a ball or sphere with each rotary axis in its other sense as well."""
+        if not all(readings.kind.startswith(("r-test", "sphere")) for readings in sets):
+            return
+        for name, axis in scene.machine.axes.items():
+            if axis.is_linear or not any(np.ptp(row.coordinates[name]) for row in sets):
+                continue
+            axes = {**scene.machine.axes, name: replace(axis, direction=-axis.direction)}
+            machine = replace(scene.machine, axes=axes)
+            other = replace(scene, model=replace(scene.model, machine=machine))
+            options = FitOptions(self.fit, self.robust, self.priors, self.instrument)
+            try:
+                files = zip(self.data, kinds, strict=False)
+                again = [read_readings(file, other, kind, self.frame) for file, kind in files]
+                after_mm = rms_mm(Fit.of(other, again, options, check_cancelled).after)
+            except (
+                OptionError,
+                SceneError,
+            ):  # cannot run in this sense
+                continue
+            if after_mm <= max(AS_WELL * found.rms_after_mm, NO_RESIDUAL_MM):
+                yield (
+                    f"{name} may turn in the other sense: the residuals are"
+                    f" {after_mm * UM_PER_MM:.3g} µm with machine.direction.{name} ="
+                    f" {-axis.direction}, {found.rms_after_mm * UM_PER_MM:.3g} µm with"
+                    f" {axis.direction}, and the errors differ. Check which way it turns"
+                )
 
     def fit_readings(
         self,
