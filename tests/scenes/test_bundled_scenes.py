@@ -27,7 +27,12 @@ def test_bundled_scene_loads_without_remarks_and_says_what_it_is(name):
     assert scene.title not in ("", name)
     assert len(scene.description) > 40
     # but for rotary axes that follow a publication
-    assert not [note for note in scene.notes if "turns the tool about" not in note]
+    turned = [axis for axis in scene.machine.axes if scene.machine.sense(axis) < 0]
+    assert not any(scene.machine.axes[axis].is_linear for axis in turned)
+    assert len(scene.notes) == len(turned)
+    for axis, note in zip(turned, scene.notes, strict=True):
+        assert note.startswith(f"machine.direction.{axis} = ")
+        assert note.endswith("against ISO 841")
     assert scene.trace_points_mm
     assert load_scene(scene_path(name)) == scene
 

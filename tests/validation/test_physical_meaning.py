@@ -157,3 +157,8 @@ def test_readings_that_fit_either_sense_of_a_table_are_asked_about(tmp_path):
         if note.startswith("B may turn in the other sense")
     )
     assert "machine.direction.B = 1" in note
+
+
+def test_a_sense_that_circles_of_the_linear_axes_tell_is_not_asked_about():
+    found = Calibrate(data=("tcp_off.csv",)).run(load_scene("fork_head_bc"), lambda _: None)
+    assert not [note for note in found.notes if "may turn in the other sense" in note]

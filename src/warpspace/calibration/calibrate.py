@@ -137,9 +137,17 @@ class Calibrate(Analysis):
                 f"{{frame}} {self.frame}: no file holds error vectors ({{kinds}} points, tracker)"
             )
         count = len(self.data)
-        found = self.fit_readings(scene, sets[:count], sets[count:], lambda: watch(0.0))
-        senses = self._sense_notes(scene, sets[:count], kinds, found, lambda: watch(0.0))
+
+        def check_cancelled() -> None:
+            watch(0.0)
+
+        found = self.fit_readings(scene, sets[:count], sets[count:], check_cancelled)
+        senses = self._sense_notes(scene, sets[:count], kinds, found, check_cancelled)
         return replace(found, notes=(*found.notes, *senses))
+
+    @property
+    def fit_options(self) -> FitOptions:
+        return FitOptions(self.fit, self.robust, self.priors, self.instrument)
 
     def _sense_notes(
         self,
@@ -152,17 +160,18 @@ class Calibrate(Analysis):
         """Fit readings of a ball or sphere with each rotary axis in its other sense as well."""
         if not all(readings.kind.startswith(("r-test", "sphere")) for readings in sets):
             return
+        # a circle of the linear axes tells the sense, and the positions were read with it
+        known = {circle.axis for readings in sets for circle in readings.circles}
         for name, axis in scene.machine.axes.items():
-            if axis.is_linear or not any(np.ptp(row.coordinates[name]) for row in sets):
+            turns = any(np.ptp(readings.coordinates[name]) for readings in sets)
+            if axis.is_linear or name in known or not turns:
                 continue
-            axes = {**scene.machine.axes, name: replace(axis, direction=-axis.direction)}
-            machine = replace(scene.machine, axes=axes)
+            machine = scene.machine.with_direction(name, -axis.direction)
             other = replace(scene, model=replace(scene.model, machine=machine))
-            options = FitOptions(self.fit, self.robust, self.priors, self.instrument)
             try:
                 files = zip(self.data, kinds, strict=False)
                 again = [read_readings(file, other, kind, self.frame) for file, kind in files]
-                after_mm = rms_mm(Fit.of(other, again, options, check_cancelled).after)
+                after_mm = rms_mm(Fit.of(other, again, self.fit_options, check_cancelled).after)
             except (
                 OptionError,
                 SceneError,
@@ -262,8 +271,7 @@ def calibrate(
     if not sets:
         raise OptionError("no readings; expected at least one file ({data} FILE)")
     request = request or Calibrate()
-    options = FitOptions(request.fit, request.robust, request.priors, request.instrument)
-    return _report(Fit.of(scene, sets, options, check_cancelled), predict)
+    return _report(Fit.of(scene, sets, request.fit_options, check_cancelled), predict)
 
 
 def _report(fit: Fit, predict: Sequence[Readings]) -> Calibration:

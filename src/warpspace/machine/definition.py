@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import combinations
 
@@ -218,6 +218,11 @@ class Machine:
         """Return the sign of the tool motion relative to the workpiece for a positive command."""
         side = 1 if axis in self.chain.tool else -1
         return side * self.axes[axis].direction
+
+    def with_direction(self, axis: str, direction: int) -> "Machine":
+        """Return the machine with another sense of motion of an axis, +1 or −1."""
+        axes = {**self.axes, axis: replace(self.axes[axis], direction=direction)}
+        return replace(self, axes=axes)
 
     def end_frames(self, side: str) -> tuple[tuple[str, Vector, Vector], ...]:
         """List the fixed frames at the end of a branch: name, offset [mm], rotation [°]."""

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import warpspace
+from products import first
 from warpspace.analysis.registry import verb
 from warpspace.bench.kinds.circular import Circular
 from warpspace.exceptions import OptionError, SceneError
@@ -92,11 +93,12 @@ def test_with_tcp_the_tip_stays_on_its_line(name: str, request: pytest.FixtureRe
     assert read.blocks == 5
 
 
-def test_random_arcs_are_circles(dvf: Scene):
+@pytest.mark.parametrize("count", first(240, 1000))
+def test_random_arcs_are_circles(dvf: Scene, count: int):
     rng = np.random.default_rng(7)
     planes = {"G17": ("X", "Y", "Z"), "G18": ("Z", "X", "Y"), "G19": ("Y", "Z", "X")}
     text, expected = ["G91 G0 X0 Y0 Z0 F1"], []
-    for number in range(240):
+    for number in range(count):
         plane, axes = list(planes.items())[number % 3]
         radius, start = rng.uniform(1.0, 90.0), rng.uniform(0.0, 2.0 * np.pi)
         turn, pitch = rng.uniform(0.1, 2.0 * np.pi - 0.1), rng.uniform(-5.0, 5.0)

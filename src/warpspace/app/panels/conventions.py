@@ -111,9 +111,9 @@ def with_choice(state: AppState, choice: str) -> AppState:
     if group == "component_errors":
         changed = replace(model, component_errors=chosen_value, own_component_errors=())
         return _with_scene(state, changed)
-    axis = model.machine.axes[group.removeprefix("direction ")]
-    axes = {**model.machine.axes, axis.name: replace(axis, direction=int(chosen_value))}
-    return _with_scene(state, replace(model, machine=replace(model.machine, axes=axes)))
+    axis = group.removeprefix("direction ")
+    machine = model.machine.with_direction(axis, int(chosen_value))
+    return _with_scene(state, replace(model, machine=machine))
 
 
 def with_own_conventions(state: AppState) -> AppState:
