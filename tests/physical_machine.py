@@ -153,6 +153,32 @@ class PhysicalMachine:
         wide, square = (np.arccos(np.clip(a @ b, -1.0, 1.0)) for a, b in (actual, nominal))
         return float(wide - square) * 1e6
 
+    def circular_um(self, plane: str, radius_mm: float, angle_deg: Vector) -> Vector:
+        """Readings of a ball bar between the middle and the tool, which runs a circle about it."""
+        centre, readings = self.relative(self.middle, errors=False)[:3, 3], []
+        for theta in np.deg2rad(angle_deg):
+            q = dict(self.middle)
+            q[plane[0]] += radius_mm * np.cos(theta)
+            q[plane[1]] += radius_mm * np.sin(theta)
+            lengths = [
+                np.linalg.norm(self.relative(q, errors=errors)[:3, 3] - centre)
+                for errors in (True, False)
+            ]
+            readings.append((lengths[0] - lengths[1]) * 1e3)
+        return np.array(readings)
+
+    def diagonal_um(
+        self, start: Mapping[str, float], nodes: Sequence[Mapping[str, float]]
+    ) -> Vector:
+        """Displacements along the line from a start through nodes, actual − nominal."""
+        first, last = (self.relative(q, errors=False)[:3, 3] for q in (start, nodes[-1]))
+        along = (last - first) / np.linalg.norm(last - first)
+        return np.array([(self.error_um(q) - self.error_um(start)) @ along for q in nodes])
+
+    def ball_um(self, q: Mapping[str, float]) -> Vector:
+        """Reading of an R-test: tool minus the ball that it nominally stays on, in R."""
+        return self.side(self.workpiece, q, errors=False)[:3, :3] @ self.error_um(q)
+
     # --- what controllers do ----------------------------------------------------------------------
 
     def nodes(self, count: int = 4) -> list[dict[str, float]]:

@@ -184,8 +184,8 @@ def test_page_report_and_command_have_one_figure_for_one_question():
     settings = ReportSettings(grid=3, spec_um=50.0, samples=design.SAMPLES)
     (reviewed,) = build_review((SCENE,), settings).scenes
     assert reviewed.results["worst"].points[0].sampled.probability == wanted
-    asked = state_of(SCENE, limit_um=50.0)
+    asked = state_of(SCENE, SCENE.default_loop, limit_um=50.0)
     assert answer_of(lone_part(design.TolerancesPanel, "allocate"), asked).before == wanted
-    forms = {"concepts.loop": "tool", "concepts.own_tolerances": "1"}
+    forms = {"concepts.loop": "relative", "concepts.own_tolerances": "1"}
     (found,) = answer_of(concepts_part(), replace(asked, forms=forms)).concepts
     assert found.sampled.probability == wanted

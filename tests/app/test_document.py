@@ -116,7 +116,7 @@ def test_a_link_to_a_known_scene_is_short_and_readable():
 
 def test_a_link_reads_as_it_has_always_been_spelt():
     line = (
-        "EXX=2.5&B=-30.0&exaggeration=2000.0&component=x&loop=relative&placed=1&nodes=11"
+        "EXX=2.5&B=-30.0&exaggeration=2000.0&component=x&loop=tool&placed=1&nodes=11"
         "&shown.dark=1&look.surface=cut&look.slices_mm.X=10.0&machine.linear_mm.X=20.0"
         "&specification.limit_um=25.0&specification.fixed=EXX&rotary.off=1&rotary.own=1.0,2.0,3.5"
         "&rotary.held.B=-15.0,0.0&test=r-test&test.path=0&test.points=9&excluded=EXX&only=EAX,EBX"

@@ -67,7 +67,7 @@ def test_every_export_has_what_is_drawn_and_its_title(shown, stem):
     picture = picture_of(shown)
     rows = rows_of(picture)
     assert all(title in rows[0]["scene"] for title in WORDS[shown].split(": ", 1)[1].split(" − "))
-    assert rows[0]["loop"] == "tool"
+    assert rows[0]["loop"] == "relative"
     extras = extras_of(picture)
     assert extras["settings"]["exaggeration"] == picture.exaggeration
     assert extras["colours"]["low"] == picture.scale.low
@@ -127,11 +127,11 @@ def test_the_figure_shows_what_is_coloured_in_the_range_that_is_fixed(renderer):
 
 
 def test_two_loops_on_one_sheet_are_refused_in_words():
-    picture = picture_of("difference", replace(with_pin(START), loop=Loop("relative")))
+    picture = picture_of("difference", replace(with_pin(START), loop=Loop("tool")))
     with pytest.raises(OptionError, match="same loop"):
         draw_figure(picture, "", threading.Event())
     # the other exports draw each side through its own
-    assert rows_of(picture)[0]["loop"] == "relative − tool"
+    assert rows_of(picture)[0]["loop"] == "tool − relative"
 
 
 def test_volumes_that_differ_export_the_side_that_is_drawn():

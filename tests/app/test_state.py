@@ -124,9 +124,9 @@ def test_undo_says_what_it_takes_back(state, words, store):
     assert store.undo() == words
 
 
-def test_a_machine_with_errors_of_its_table_only_opens_in_the_relative_loop():
-    assert start_state(load_scene("teach_tilted_c")).loop is Loop.RELATIVE
-    assert FIRST.loop is Loop.TOOL
+def test_a_machine_that_moves_its_workpiece_opens_in_the_relative_loop():
+    assert FIRST.loop is Loop.RELATIVE
+    assert start_state(load_scene("machine_scara")).loop is Loop.TOOL
 
 
 def test_another_scene_keeps_how_it_is_looked_at():

@@ -108,7 +108,8 @@ def test_field_csv_can_be_read_back_as_an_error_table(tmp_path, warpspace):
     warpspace("field", "dvf5000_first", *points, "--csv", tmp_path / "run.csv")
     path = tmp_path / "again.toml"
     path.write_text(
-        'machine = "dvf5000"\n[errors]\nEXX = { csv = "run.csv", column = "error_tool_R_x_um" }\n',
+        'machine = "dvf5000"\n[errors]\n'
+        'EXX = { csv = "run.csv", column = "error_relative_R_x_um" }\n',
         encoding="utf-8",
     )
     first = api.evaluate(api.load_scene("dvf5000_first"), at={"X": 0.0, "Z": -280.0})

@@ -27,7 +27,7 @@ COMMANDS = {
     "compare": ("compare", "dvf5000_first", "dvf5000_second", "--grid", "5"),
     "against": ("check", "dvf5000_first", "--against", "dvf5000_proposed", "--grid", "5"),
     "contributions": ("contributions", "dvf5000_general"),
-    "sobol": ("contributions", "dvf5000_proposed", "--sobol", "32"),
+    "sobol": ("contributions", "dvf5000_proposed", "--loop", "tool", "--sobol", "32"),
     "montecarlo": ("montecarlo", "dvf5000_proposed", "--samples", "500", "--limit", "40"),
     "allocate": ("allocate", "dvf5000_first", "--limit", "40", "--samples", "500"),
     "circular": ("test", "circular", "dvf5000_first", "--radius", "50"),

@@ -126,7 +126,7 @@ def test_files_say_what_they_show():
     assert image.text["Scene"] == "dvf5000_first"
     assert image.text["Exaggeration"] == "1000"
     assert image.text["Software"].startswith("warpspace ")
-    assert "component=norm, view=iso, loop=tool, grid=21" in image.text["Description"]
+    assert "component=norm, view=iso, loop=relative, grid=21" in image.text["Description"]
     assert "first machine measured" in image.text["Title"]
 
 

@@ -13,7 +13,10 @@ from warpspace.analysis.commands.form import Form
 from warpspace.analysis.commands.line import Line
 from warpspace.bench.base import run_test
 from warpspace.bench.data import parse_table
+from warpspace.bench.kinds.circular import Circular
+from warpspace.bench.kinds.diagonals import Diagonals
 from warpspace.bench.kinds.positioning import Positioning
+from warpspace.bench.kinds.rotary_axis import RotaryAxis, RTest
 from warpspace.bench.kinds.straightness import Squareness, Straightness
 from warpspace.formats.compensation.compensate import Compensate, compensate
 from warpspace.formats.registry import ReadOptions, read_errors
@@ -85,6 +88,67 @@ def test_instruments_read_along_programmed_directions(machine):
         _, change = angle_error(scene.machine, first, second)
         angle = machine.squareness_urad(first, second)
         assert outcome["end_points_urad"] * change == pytest.approx(angle, abs=0.2, rel=1e-3)
+
+
+RADIUS = 60.0  # mm; fits into every random volume
+
+
+def about_centre(values, angle_deg):
+    """Values without the part that another centre of the circle explains."""
+    theta = np.deg2rad(angle_deg)
+    centre = np.stack([np.cos(theta), np.sin(theta)], -1)
+    return values - centre @ np.linalg.lstsq(centre, values, rcond=None)[0]
+
+
+@CHAINS
+@given(bent_machines(rotary=1), st.sampled_from(PAIRS))
+def test_a_ball_bar_reads_distances_on_the_part(machine, plane):
+    scene = scene_of(machine)
+    test = Circular(plane=plane, radius_mm=RADIUS, points=24)
+    run = run_test(scene, test).model
+    angle = run.plan.marks["angle_deg"][:24]
+    simulated = machine.circular_um(plane, RADIUS, angle)
+    read = about_centre(run.readings[:24], angle)
+    assert read == pytest.approx(about_centre(simulated, angle), **ROUNDING)
+    rows = [f"+,{at:.6f},{um:.9f}" for at, um in zip(angle, simulated, strict=True)]
+    text = "direction,angle_deg,radial_um\n" + "\n".join(rows)
+    result = run_test(scene, test, parse_table(text, test.data_columns(scene), "bar.csv"))
+    measured = result.measured.outcome
+    for name in ("circular_deviation_um", "scale_difference_um"):
+        assert measured[name] == pytest.approx(run.outcome[name], abs=0.1, rel=1e-3), name
+    angle = run.outcome["squareness_urad"]  # 0.05 µm at a radius of 60 mm
+    assert measured["squareness_urad"] == pytest.approx(angle, abs=2.0, rel=1e-3)
+
+
+@CHAINS
+@given(bent_machines())
+def test_diagonals_are_displacements_on_the_part(machine):
+    run = run_test(scene_of(machine), Diagonals(targets=3)).model
+    places = {axis: np.asarray(at) for axis, at in run.plan.coordinates.items()}
+    for which in range(4):
+        rows = np.flatnonzero(run.plan.marks["diagonal"] == which)[:3]
+        sites = [run.plan.site[row] for row in rows]
+        nodes = [{axis: float(at[site]) for axis, at in places.items()} for site in sites]
+        simulated = machine.diagonal_um(nodes[0], nodes)
+        assert run.readings[rows] - run.readings[rows[0]] == pytest.approx(simulated, **ROUNDING)
+
+
+@CHAINS
+@given(bent_machines(rotary=2))
+def test_an_r_test_and_an_encoder_read_rotary_axes(machine):
+    scene = scene_of(machine)
+    for axis in (body.name for body in machine.bodies if not body.is_linear):
+        run = run_test(scene, RTest(axis=axis, points=6)).model
+        places = {name: np.asarray(at) for name, at in run.plan.coordinates.items()}
+        read = run.readings.reshape(3, -1).T
+        for row, site in enumerate(run.plan.site[: len(read)]):
+            q = {name: float(at[site]) for name, at in places.items()}
+            assert read[row] == pytest.approx(machine.ball_um(q), **ROUNDING)
+        run = run_test(scene, RotaryAxis(axis=axis, points=8)).model
+        angle = run.plan.marks["angle_deg"][:8]
+        angular = run.readings.reshape(6, -1)[5]
+        simulated = machine.angle_urad(axis, axis, angle)
+        assert angular - angular[0] == pytest.approx(simulated, **ROUNDING)
 
 
 @CHAINS
@@ -208,6 +272,50 @@ def test_a_table_leaves_what_it_says(machine, name, placed):
             for errors in (remaining, before)
         ]
         assert rms[0] <= rms[1] + 0.1
+
+
+@CHAINS
+@given(bent_machines(), st.sampled_from(WRITTEN))
+def test_a_table_that_is_imported_is_the_error_that_it_corrects(machine, name):
+    scene = scene_of(machine)
+    written = compensate(scene, Compensate(formats=(name,), loop="relative"), 3)
+    kind = written.format
+    sources = [
+        source_of_text(text, f"compensation{add}{'' if add else kind.endings[0]}")
+        for add, text in written.files.items()
+    ]
+    base = parse_scene(machine.scene_text(errors=False), "nominal")
+    reading = read_errors(sources, ReadOptions(base.machine), name)
+    scene = build_imported_scene(reading, base, "", "table").scene
+    nodes, bare = machine.nodes(3), machine.without_errors()
+    positions = {axis: np.array([q[axis] for q in nodes]) for axis in base.machine.axes}
+    moves = written.controller.moves(positions)
+    by_node = np.stack([np.broadcast_to(move, len(nodes)) for move in moves.values()], -1)
+    corrected = -np.array(
+        [
+            bare.corrected_um(q, dict(zip(moves, node.tolist(), strict=True)))
+            for q, node in zip(nodes, by_node, strict=True)
+        ]
+    )
+    errors = [evaluate(scene, at=q, frame="workpiece", loop="relative").error_um for q in nodes]
+    points = np.array([machine.relative(q, errors=False)[:3, 3] for q in nodes])
+    if name in GRIDLESS:
+        errors, corrected = (placed_um(points, np.array(part)) for part in (errors, corrected))
+    assert np.array(errors) == pytest.approx(corrected, **ROUNDING)
+
+
+@CHAINS
+@given(bent_machines(), st.sampled_from(("iso-text", "isg-csv")))
+def test_error_parameters_of_a_control_are_those_of_the_machine(machine, name):
+    written = compensate(scene_of(machine), Compensate(formats=(name,)), 3)
+    base = parse_scene(machine.scene_text(errors=False), "nominal")
+    reading = read_errors(
+        [source_of_text(written.files[""], "v.txt")], ReadOptions(base.machine), name
+    )
+    scene = build_imported_scene(reading, base, "", "table").scene
+    for q in machine.nodes(3):
+        field = evaluate(scene, at=q, exact=True, frame="workpiece", loop="relative")
+        assert field.error_um == pytest.approx(machine.error_um(q), **ROUNDING)
 
 
 @CHAINS

@@ -133,5 +133,5 @@ def test_the_review_tells_the_measured_machine_in_six_steps_whose_numbers_hold()
 
 def test_wobbling_table_leaves_the_tool_loop_straight_and_bends_the_relative_one():
     scene = load_scene("teach_wobbling_table")
-    assert statistics(evaluate(scene, grid=5)).max_um == 0.0
-    assert statistics(evaluate(scene, grid=5, loop="relative")).max_um > 1.0
+    assert statistics(evaluate(scene, grid=5, loop="tool")).max_um == 0.0
+    assert statistics(evaluate(scene, grid=5)).max_um > 1.0

@@ -195,10 +195,10 @@ def test_a_sure_point_keeps_its_limit_or_not():
 def test_where_nothing_that_is_stated_acts_all_is_unknown():
     text = HEAD.replace("wFXYZt", "wCFXYZt") + "EXX = 3\n[uncertainty]\nEXC = 1\n"
     scene = parse_scene(text, "s")
-    found = Uncertainty(nodes=3).run(scene, lambda _: None)
+    found = Uncertainty(nodes=3, loop="tool").run(scene, lambda _: None)
     assert found.as_json()["statistics"]["u95_mean_um"] is None
     assert scene_uncertainty(scene).draw(np.random.default_rng(0), 3).shape == (3, 0)
     bare = replace(scene, errors=ErrorSet())  # what is stated moves the table only
-    found = Uncertainty(nodes=3, limit_um=1.0, verify=True).run(bare, lambda _: None)
+    found = Uncertainty(nodes=3, limit_um=1.0, verify=True, loop="tool").run(bare, lambda _: None)
     assert found.as_json()["statistics"]["u95_max_um"] == 0.0
     assert (found.probability_everywhere, found.shares) == (1.0, [])

@@ -204,7 +204,7 @@ def _resolve(hint: Any) -> tuple[Any, Grammar | None]:
 
 ALL = "all"
 LOOP_HELP = "Structural loop: tool point, workpiece point, or tool relative to workpiece"
-LOOP_UNSET = "tool; relative with a placement or a linear axis under the workpiece"
+LOOP_UNSET = "tool; relative with a placement or an axis under the workpiece"
 PLACED_HELP = (
     "Fit out the placement of the workpiece: three shifts and three small rotations of it that"
     " minimise the RMS over the working volume. Evaluates the relative loop"

@@ -80,7 +80,7 @@ loop_option = choice_option(
     "--loop",
     LOOPS,
     "Structural loop: tool point, workpiece point, or tool relative to workpiece.  [tool; relative"
-    " with --placed or a linear axis under the workpiece]",
+    " with --placed or an axis under the workpiece]",
     None,
 )
 direction_option = click.option(

@@ -143,9 +143,8 @@ class Scene:
 
     @property
     def default_loop(self) -> Loop:
-        """Tool relative to workpiece where that is placed or moved by a linear axis; else tool."""
-        moved = any(axes.is_linear(axis) for axis in self.machine.chain.workpiece)
-        return Loop.RELATIVE if self.placed or moved else Loop.TOOL
+        """Tool relative to workpiece if that is placed or moved by an axis, else tool."""
+        return Loop.RELATIVE if self.placed or self.machine.chain.workpiece else Loop.TOOL
 
     def view(self, loop: Loop | None = None, frame: str = "machine") -> View:
         """Return the view of the scene for a loop, with the reference of the scene."""
@@ -179,8 +178,8 @@ def evaluate(
     grid : int or sequence of int, (3,), optional
         Nodes per axis of the working volume; 21 by default.
     loop : Loop or str, optional
-        "tool", "workpiece" or "relative"; by default relative for a placed scene and where a
-        linear axis moves the workpiece, else tool. At points the workpiece loop takes the scene's
+        "tool", "workpiece" or "relative"; by default relative for a placed scene and where an
+        axis moves the workpiece, else tool. At points the workpiece loop takes the scene's
         functional workpiece point; over the grid the workpiece points that nominally coincide with
         the nodes.
     exact : bool, optional

@@ -422,7 +422,7 @@ def imported_text(
     head = [f"# Read from {_plain(source)}. Lengths mm, angles degrees."]
     head += [f"# {_plain(note)}" for note in notes]
     parts = ["\n".join(head), scene_to_toml(scene).strip()]
-    parts.append("\n".join(error_lines(machine.chain, travel)))
+    parts.append("\n".join(error_lines(machine, travel)))
     if meshes:
         lines = ["[bodies]", *(f'{frame} = "{file}"' for frame, file in meshes.items())]
         parts.append("\n".join(lines))

@@ -14,15 +14,23 @@ from warpspace.analysis.options import ALL, LOOP_HELP, LOOP_UNSET, PLACED_HELP, 
 from warpspace.analysis.statistics import Summary, volume_statistics
 from warpspace.analysis.uncertainty import propagation
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import ErrorBasis, View, amplitudes_of, placed_words
+from warpspace.field.evaluate import (
+    ErrorBasis,
+    View,
+    amplitudes_of,
+    fit_placement,
+    placed_words,
+    placement_effect,
+)
 from warpspace.field.grid import DEFAULT_NODES, build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import Parameter, parameter
 from warpspace.machine.limits import MAX_ERROR, MAX_TEXT, MIN_HALF_WIDTH, REPAIR_COUNT, REPAIR_NODES
 from warpspace.scene.model import Scene, evaluate_grid, grid_basis, second_order, with_placement
-from warpspace.units import spell, spell_short
+from warpspace.units import Array, spell, spell_short
 
 DEFAULT_LIMIT = 200.0  # µm or µrad by which an error may be changed, unless somebody says otherwise
+PLACEMENT_ONLY = 1e-9  # share of its effect that remains of an error which is only a placement
 MOST_BARS, MOST_VALUES = 14, 3  # errors in a chart, and values beside a bar
 OBJECTIVE_WORDS = {Objective.RMS: "RMS |E|", Objective.MAX: "largest |E|"}
 FOUR = ("mean_um", "rms_um", "p95_um", "max_um")
@@ -105,7 +113,8 @@ class Adjust(description.Analysis):
     adjustable: Keys = option(
         (),
         "Errors that may be adjusted; of a curve the amplitude (compensation)",
-        unset="squareness and alignment: the constant errors",
+        unset="squareness and alignment: the constant errors that no placement of the workpiece"
+        " replaces",
     )
     limit: Limits = option(
         (),
@@ -128,7 +137,7 @@ class Adjust(description.Analysis):
         basis = grid_basis(scene, grid, view, self.included(scene))
         amplitudes = amplitudes_of(scene.errors, basis.keys)
         volume = Volume(basis, grid, amplitudes)
-        candidates = _candidates(volume, self)
+        candidates = _candidates(volume, self, placements=_placements(scene, volume))
         limits = np.array([self.limit_of(key) for key in basis.keys])
         low = np.maximum(-limits, -MAX_ERROR - amplitudes)
         high = np.minimum(limits, MAX_ERROR - amplitudes)
@@ -376,13 +385,24 @@ def _with_uncertainty(
     )
 
 
-def _candidates(volume: Volume, analysis: Adjust) -> tuple[int, ...]:
+def _placements(scene: Scene, volume: Volume) -> Array:
+    """Find the errors, [K], that move the whole volume as a placement of the workpiece does."""
+    grid, response = volume.grid, volume.basis.position
+    fitted = fit_placement(scene.model, grid, response)
+    rest = response - placement_effect(scene.model, fitted, grid.coordinates, grid.point_mm)[0]
+    largest = [np.abs(part).max(axis=(1, 2, 3, 4), initial=0.0) for part in (rest, response)]
+    return np.less_equal(largest[0], PLACEMENT_ONLY * largest[1])
+
+
+def _candidates(volume: Volume, analysis: Adjust, *, placements: Array) -> tuple[int, ...]:
     keys = volume.basis.keys
     active = [keys[index] for index in volume.active_indices]
     if ALL in analysis.adjustable:
         places = volume.active_indices
     elif not analysis.adjustable:
-        places = tuple(i for i in volume.active_indices if parameter(keys[i]).is_constant)
+        places = tuple(
+            i for i in volume.active_indices if parameter(keys[i]).is_constant and not placements[i]
+        )
     else:
         for key in analysis.adjustable:
             if key not in active:

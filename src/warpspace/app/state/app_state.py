@@ -465,7 +465,7 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
         positions,
         start,
         scene.exaggeration,
-        loop=start_loop(scene),
+        loop=scene.default_loop,
         placed=scene.placed,
         specification=Specification(START_UM if scene.limit_um is None else scene.limit_um),
         tolerances=scene.tolerances,
@@ -476,10 +476,3 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
         notes=notes,
     )
     return replace(state, **changes)
-
-
-def start_loop(scene: Scene) -> Loop:
-    """Return the default loop, or relative where only axes of the workpiece have errors."""
-    axes = {parameter(key).axis for key in scene.parameter_keys if scene.errors.amplitude(key)}
-    only_table = bool(axes) and axes.isdisjoint(scene.machine.chain.tool)
-    return Loop.RELATIVE if only_table else scene.default_loop

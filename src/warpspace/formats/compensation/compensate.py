@@ -8,7 +8,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
 from warpspace.analysis.description import Analysis, ProgressCallback, Result, to_json
-from warpspace.analysis.options import PLACED_HELP, Grammar, option
+from warpspace.analysis.options import LOOP_UNSET, PLACED_HELP, Grammar, option
 from warpspace.analysis.statistics import Statistics
 from warpspace.analysis.uncertainty.propagation import u95_lines
 from warpspace.exceptions import OptionError
@@ -124,8 +124,7 @@ class Compensate(Analysis):
     loop: Literal["tool", "relative"] | None = option(
         None,
         "Structural loop to correct",
-        unset="relative where a linear axis, or with --orientation all rotary axes, carry the"
-        " workpiece",
+        unset=LOOP_UNSET,
     )
     placed: bool = option(False, PLACED_HELP)
     orientation: bool = option(
@@ -150,11 +149,10 @@ class Compensate(Analysis):
         return self if stem is None else replace(self, stem=stem)
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "Compensation | Sweep":
-        options = replace(self, loop="relative") if self.placed and self.loop is None else self
-        scene = with_placement(scene, options.loop or "", placed=self.placed)
+        scene = with_placement(scene, self.loop, placed=self.placed)
         if self.sweep:
-            return sweep(scene, options)
-        return compensate(scene, options, check_cancelled=lambda: watch(0.0))
+            return sweep(scene, self)
+        return compensate(scene, self, check_cancelled=lambda: watch(0.0))
 
 
 @dataclass(frozen=True)

@@ -164,10 +164,7 @@ def build_corrector(scene: Scene, loop: str = "", *, orientation: bool = False) 
         raise OptionError(
             f"the machine {machine.chain} has no rotary axis; {{orientation}} needs one"
         )
-    carried: set[str] = set(linear) & set(machine.chain.workpiece)
-    if orientation and not set(rotary) & set(machine.chain.tool):
-        carried |= set(rotary)
-    chosen = Loop(loop) if loop else Loop.RELATIVE if carried else Loop.TOOL
+    chosen = Loop(loop) if loop else scene.default_loop
     if chosen is Loop.TOOL:
         linear = tuple(axis for axis in linear if axis in machine.chain.tool)
         rotary = tuple(axis for axis in rotary if axis in machine.chain.tool)

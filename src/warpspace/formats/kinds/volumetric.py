@@ -47,6 +47,10 @@ ROTATION = (
     "rotation about the nominal axis (alternative_model 0); --variant selects the distorted axis",
     "rotation about the distorted axis (alternative_model 1)",
 )
+DESCRIBED = (
+    "the control describes the machine that was measured: the same chain and workpiece_axes, negate"
+    " empty"
+)
 IGNORED = re.compile(r"P0[XYZ]|N0[XYZ]|P[XYZ][ABC]|V[XYZ][XYZABC]|ID[XYZ]|LN[XYZABC]")
 FINE_DEG = 1.0  # step of a table to which a harmonic is added
 
@@ -92,10 +96,12 @@ def _errors_to_write(corrections: RequiredCorrections, name: str) -> measured.Im
 
 def _finished(imported: measured.ImportedErrors, options: ReadOptions) -> measured.ImportedErrors:
     is_alternative = options.variant == ALTERNATIVE
+    chain = options.machine and options.machine.chain
+    description = f"; here {chain}, workpiece_axes {len(chain.workpiece)}" if chain else ""
     imported = replace(
         imported,
         units=("mm", "rad", "degrees for rotary positions"),
-        assumed=(*imported.assumed, *ASSUMED, ROTATION[is_alternative]),
+        assumed=(*imported.assumed, *ASSUMED, ROTATION[is_alternative], DESCRIBED + description),
         convention=CONVENTION,
     )
     if not is_alternative:
