@@ -42,6 +42,18 @@ def test_one_skew_factor_corrects_one_squareness(name):
     assert found.unplaced.after_statistics.rms_um > found.after_statistics.rms_um
 
 
+def test_a_placement_rotates_in_full():
+    scene = machine("dvf5000", "EA0C = 10_000\nEB0B = 5_000")  # turn and shift the part as a whole
+    field = evaluate(scene, grid=4, exact=True, placed=True)
+    assert field.norm_um.max() < 1e-3
+    scene = parse_scene(
+        'machine = "printer_3d"\n[convention]\nreference_axis = "free"\n[errors]\nEB0X = 1e4', "s"
+    )
+    found = compensated(scene, "marlin")  # J alone, 10 mrad; its second order remains
+    assert found.files[""].splitlines()[-1] == "M852 I0.0 J-0.01 K0.0"
+    assert found.after_statistics.mean_um < 2.75
+
+
 @pytest.mark.parametrize(
     ("name", "angles"),
     [("lathe_mill", (13.0, 1.49, -15.16)), ("horizontal_b_table", (37.12, -25.91, -8.0))],

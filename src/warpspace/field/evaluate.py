@@ -8,6 +8,7 @@ these.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from functools import cached_property, partial
 from typing import NamedTuple
 
@@ -19,7 +20,7 @@ from warpspace.kinematics.components import join, rotate, split, split_rows, sub
 from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
 from warpspace.machine.axes import TravelDirection, is_linear, parameter
 from warpspace.machine.errors import ErrorSet
-from warpspace.units import UM_PER_MM_URAD, Array, spell
+from warpspace.units import RAD_PER_URAD, UM_PER_MM, UM_PER_MM_URAD, Array, spell
 
 
 @dataclass(frozen=True)
@@ -116,38 +117,71 @@ class ErrorBasis:
 # Placement numbers are a shift along the axes of the workpiece frame and a small rotation about
 # them, so that they do not depend on the axis positions.
 
+EXACT_STEPS = 3  # that fit a full rotation; each leaves the product of the turn and the step before
 MIN_EFFECT = 1e-12
 """Share of the largest effect, squared, below which a combination of the six is not fitted."""
 
 
-def fit_placement(model: Model, grid: grids.Grid, error_um: Array) -> Array:
+class Turn(IntEnum):
+    """How far a placement turns the workpiece, and where its effect is observed."""
+
+    IN_FRAME = -1  # in full; the workpiece moves, in R
+    SMALL = 0  # to first order
+    ON_PART = 1  # in full; the tool moves, on the workpiece
+
+
+def fit_placement(
+    model: Model, grid: grids.Grid, error_um: Array, turn: Turn = Turn.SMALL
+) -> Array:
     """Fit the placement of the workpiece, [..., 6], µm and µrad, to relative errors over a volume.
 
     Errors, [..., nx, ny, nz, 3], µm, are absolute, in R; leading axes are independent fits.
     Least squares, nodes weighted by their share of the volume; the minimum-norm solution where a
-    line or a point does not determine all six.
+    line or a point does not determine all six. A full turn is fitted to a single field.
     """
     columns = _columns(model, grid.coordinates, grid.point_mm)
     weighted = (grid.weights[..., None, None] * columns).reshape(-1, 6)
     normal = np.linalg.pinv(columns.reshape(-1, 6).T @ weighted, rcond=MIN_EFFECT, hermitian=True)
-    placements = error_um.reshape(-1, len(weighted)) @ weighted @ normal
-    return placements.reshape(*error_um.shape[:-4], 6)
+
+    def fit(errors: Array) -> Array:
+        return (errors.reshape(-1, len(weighted)) @ weighted @ normal).reshape(
+            *error_um.shape[:-4], 6
+        )
+
+    placement = fit(error_um)
+    for _ in range(EXACT_STEPS if turn else 0):
+        moved = placement_effect(model, placement, grid.coordinates, grid.point_mm, turn)[0]
+        placement = placement + fit(error_um - moved)
+    return placement
 
 
 def placement_effect(
-    model: Model, placement: Array, coordinates: Coordinates, point_mm: Array
+    model: Model,
+    placement: Array,
+    coordinates: Coordinates,
+    point_mm: Array,
+    turn: Turn = Turn.SMALL,
 ) -> tuple[Array, Array]:
     """Compute the relative error in R that placements, [6] or [K, 6], remove.
 
     µm and µrad, [..., 3] or [K, ..., 3]; the orientation is without the part about the tool axis.
+    A full turn is that of one placement, [6].
     """
     columns = _columns(model, coordinates, point_mm)
     turned = {name: np.zeros(()) if is_linear(name) else at for name, at in coordinates.items()}
     aim = chain.tool_axis(model, turned)
     rotation = chain.branch_pose(model, "workpiece", turned)[..., :3, :3]
     tilt = rotation - aim[..., None] * (aim[..., None, :] @ rotation)
+    shift = np.tensordot(placement, columns, (-1, -1))
+    if turn:
+        angle = placement[3:] * RAD_PER_URAD
+        beyond = turn * (transforms.vector_rotation(turn * angle) - np.eye(3))
+        beyond = beyond - transforms.skew(angle)
+        pose = chain.branch_pose(model, "workpiece", coordinates)
+        arm_mm = transforms.apply(transforms.inverse(pose), point_mm)
+        shift = shift + transforms.rotate(pose[..., :3, :3] @ beyond, arm_mm) * UM_PER_MM
     return (
-        np.tensordot(placement, columns, (-1, -1)),
+        shift,
         np.tensordot(placement[..., 3:], np.broadcast_to(tilt, columns[..., 3:].shape), (-1, -1)),
     )
 
@@ -310,7 +344,7 @@ def find_placement(
     field = evaluate_field(
         model, errors, volume.coordinates, View(view.loop), volume.point_mm, exact=exact
     )
-    return fit_placement(model, volume, field.error_um)
+    return fit_placement(model, volume, field.error_um, Turn.IN_FRAME if exact else Turn.SMALL)
 
 
 def evaluate_field(
@@ -360,7 +394,9 @@ def evaluate_field(
             piece_links, view.loop, split(grids.cut(point, nodes)), exact=exact
         )
         if placement is not None:
-            placed = map(split, placement_effect(model, placement, at, grids.cut(point, nodes)))
+            part = grids.cut(point, nodes)
+            turn = Turn.IN_FRAME if exact else Turn.SMALL
+            placed = map(split, placement_effect(model, placement, at, part, turn))
             error_um, tilt = map(subtract, (error_um, tilt), placed)
         error_um = subtract(error_um, split(grids.cut(fixed, nodes)))
         rotation = _result_rotation(model, view, at)

@@ -10,7 +10,7 @@ from warpspace.analysis.description import to_json
 from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.analysis.uncertainty.propagation import FieldUncertainty, field_uncertainty
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import ErrorField, fit_placement
+from warpspace.field.evaluate import ErrorField, Turn, fit_placement
 from warpspace.field.grid import Grid, build_grid
 from warpspace.formats.compensation.corrections import Corrector, MovedPoints, RequiredCorrections
 from warpspace.formats.measured import RUN_DIRECTION, UNDIRECTED
@@ -40,7 +40,8 @@ class CorrectedPoints:
         placement = None
         if self.placement_nodes is not None:
             grid, nodes = self.placement_nodes
-            placement = fit_placement(self.points.model, grid, nodes.field(errors).error_um)
+            error_um = nodes.field(errors).error_um
+            placement = fit_placement(self.points.model, grid, error_um, Turn.ON_PART)
         position, orientation = self.points.residual(errors, placement)
         if self.reference is not None:
             position = position - self.reference.residual(errors, placement)[0]

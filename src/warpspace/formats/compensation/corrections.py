@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import View, error_values, evaluate_exact, placement_effect
+from warpspace.field.evaluate import Turn, View, error_values, evaluate_exact, placement_effect
 from warpspace.field.grid import shares
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point, tool_axis
@@ -57,7 +57,10 @@ class MovedPoints:
         position = self.shift_mm + error_um * MM_PER_UM
         orientation = self.turn_rad + field.orientation_urad * RAD_PER_URAD
         if placement is not None:
-            shift_um, turn_urad = placement_effect(self.model, placement, at, point_mm)
+            nominal_mm = point_mm - self.shift_mm  # before the moves, on the workpiece
+            shift_um, turn_urad = placement_effect(
+                self.model, placement, at, nominal_mm, Turn.ON_PART
+            )
             position = position - shift_um * MM_PER_UM
             orientation = orientation - turn_urad * RAD_PER_URAD
         return position, orientation
