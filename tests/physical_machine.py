@@ -154,18 +154,17 @@ class PhysicalMachine:
         return float(wide - square) * 1e6
 
     def circular_um(self, plane: str, radius_mm: float, angle_deg: Vector) -> Vector:
-        """Readings of a ball bar between the middle and the tool, which runs a circle about it."""
-        centre, readings = self.relative(self.middle, errors=False)[:3, 3], []
-        for theta in np.deg2rad(angle_deg):
-            q = dict(self.middle)
-            q[plane[0]] += radius_mm * np.cos(theta)
-            q[plane[1]] += radius_mm * np.sin(theta)
-            lengths = [
-                np.linalg.norm(self.relative(q, errors=errors)[:3, 3] - centre)
-                for errors in (True, False)
-            ]
-            readings.append((lengths[0] - lengths[1]) * 1e3)
-        return np.array(readings)
+        """Readings of a ball bar; its ball was set where the tool stands in the middle."""
+        lengths = []
+        for errors in (True, False):
+            centre, nodes = self.relative(self.middle, errors=errors)[:3, 3], []
+            for theta in np.deg2rad(angle_deg):
+                q = dict(self.middle)
+                q[plane[0]] += radius_mm * np.cos(theta)
+                q[plane[1]] += radius_mm * np.sin(theta)
+                nodes.append(self.relative(q, errors=errors)[:3, 3] - centre)
+            lengths.append(np.linalg.norm(nodes, axis=1))
+        return (lengths[0] - lengths[1]) * 1e3
 
     def diagonal_um(
         self, start: Mapping[str, float], nodes: Sequence[Mapping[str, float]]

@@ -7,15 +7,7 @@ from typing import Any
 import tomli_w
 
 from warpspace.machine.axes import ErrorKind, direction_index, is_linear, parameter
-from warpspace.machine.definition import (
-    ORIGIN,
-    Chain,
-    Machine,
-    Range,
-    Vector,
-    build_machine,
-    parse_chain,
-)
+from warpspace.machine.definition import ORIGIN, Chain, Range, Vector, build_machine, parse_chain
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene, spanning_axes
 
@@ -182,7 +174,7 @@ def starter_text(chain: str | Chain, title: str = "") -> str:
         linear=[axis for axis in parsed.axes if is_linear(axis)],
         sizes=sizes,
         title=tomli_w.dumps({"title": name}).strip(),
-        errors=error_lines(build_machine(parsed), sizes.travel),
+        errors=error_lines(parsed, sizes.travel),
         line=_line,
         row=lambda key, value, why="": _line(f"{key} = {_spell(value)}", why),
     )
@@ -196,8 +188,8 @@ def _spell(value: Any) -> str:
     return f"[{', '.join(map(_spell, value))}]" if isinstance(value, tuple) else f"{value:.10g}"
 
 
-def error_lines(machine: Machine, travel: Mapping[str, Range]) -> list[str]:
-    examples, table_keys = _example_keys(machine)
+def error_lines(chain: Chain, travel: Mapping[str, Range]) -> list[str]:
+    examples, table_keys = _example_keys(chain)
     lines = [_line("[errors]", "examples; what is absent is 0, # takes one out")]
     for key, kind in examples:
         (value, why), row = EXAMPLES[kind], parameter(key)
@@ -207,20 +199,19 @@ def error_lines(machine: Machine, travel: Mapping[str, Range]) -> list[str]:
         low, high = travel[row.axis]
         table = f"{key} = {{ table = [[{low:g}, 0], [{high:g}, 5]] }}"
         lines.append(f"# {_line(table, f'{row.name}, {row.unit}: measured points')}")
-    first = machine.chain.axes[0]
+    first = chain.axes[0]
     key = f"E{'XYZ'[(direction_index(first) + 2) % 3]}{first}"
     return [*lines, f'# {key} = {{ csv = "measured.csv", column = "{key}" }}']
 
 
-def _example_keys(machine: Machine) -> tuple[list[tuple[str, str]], list[str]]:
-    chain = machine.chain
+def _example_keys(chain: Chain) -> tuple[list[tuple[str, str]], list[str]]:
     examples: list[tuple[str, str]] = []
     # tool side first: the first picture shows the tool point
     axes = sorted(chain.axes, key=lambda axis: axis not in chain.tool)
     linear = [axis for axis in axes if is_linear(axis)]
     rotary = [axis for axis in axes if not is_linear(axis)]
     rows = sorted(
-        (parameter(key) for key in machine.parameter_keys),
+        (parameter(key) for key in build_machine(chain).parameter_keys),
         key=lambda row: row.axis not in chain.tool,
     )
     if linear:

@@ -19,7 +19,6 @@ from warpspace.machine.axes import MAX_AXES, direction_index, is_axis_name, is_l
 from warpspace.machine.errors import ToleranceSet
 from warpspace.scene.model import Scene, spanning_axes
 from warpspace.scene.scene_writer import scene_to_toml
-from warpspace.scene.starter import error_lines
 from warpspace.scene.text_files import one_line, read_text
 from warpspace.units import Array
 
@@ -418,11 +417,9 @@ def imported_text(
         workspace=Workspace(_ranges(machine)),
         tolerances=ToleranceSet(TOLERANCES),
     )
-    travel = {name: axis.travel for name, axis in machine.axes.items()}
     head = [f"# Read from {_plain(source)}. Lengths mm, angles degrees."]
     head += [f"# {_plain(note)}" for note in notes]
     parts = ["\n".join(head), scene_to_toml(scene).strip()]
-    parts.append("\n".join(error_lines(machine, travel)))
     if meshes:
         lines = ["[bodies]", *(f'{frame} = "{file}"' for frame, file in meshes.items())]
         parts.append("\n".join(lines))

@@ -94,6 +94,7 @@ def test_an_imported_robot_has_the_poses_of_yourdfpy(tmp_path_factory, text, ran
         return
     found = place_robot(robot, "robot")
     scene = parse_scene(imported_text(found.machine, "robot.urdf", found.notes, {}), "robot")
+    assert not list(scene.errors)  # an import has the errors of its source: none
     machine = scene.machine
     axis_of = {
         note.split("'")[1]: note.rpartition(" ")[2] for note in found.notes if " is axis " in note

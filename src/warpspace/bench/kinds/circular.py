@@ -288,7 +288,7 @@ class Circular(BenchTest):
         if fit.shear_um is not None and not self.rotary:
             key, lever = plan.squareness_key, self.radius_mm * UM_PER_MM_URAD
             squareness = 2.0 * fit.shear_um / (float(plan.marks["gain_sign"][0]) * lever)
-            label = f"{self.plane[0]} longer than {self.plane[1]}, of the radius"
+            label = f"half of radius along {self.plane[0]} − radius along {self.plane[1]}"
             rows.append(("squareness_urad", f"squareness {key}", squareness))
             rows.append(("scale_difference_um", label, fit.scale_difference_um))
             details["squareness_key"] = key
