@@ -144,12 +144,14 @@ def numbers_words(picture: LivePicture) -> str:
 
 
 def place_words(picture: LivePicture) -> str:
-    """Format the place of the max: ``at X 275 Y −225 Z −480``."""
+    """Format the loop and the place of the max: ``tool loop · at X 275 Y −225 Z −480``."""
     node = np.unravel_index(int(np.argmax(picture.field.norm_um)), picture.shape)
     positions = picture.grid.coordinates.items()
     at = {name: float(np.broadcast_to(values, picture.shape)[node]) for name, values in positions}
     axes = formatting.point_axes(picture.drawn_state.scene, at)
-    return f"at {formatting.list_axes(axes)}" if axes else ""
+    place = [f"at {formatting.list_axes(axes)}"] if axes else []
+    loop = [] if picture.is_difference else [formatting.LOOP_WORDS[picture.drawn_state.loop]]
+    return " · ".join([*loop, *place])
 
 
 def within_limit_words(picture: LivePicture) -> tuple[str, bool]:
