@@ -143,15 +143,17 @@ def numbers_words(picture: LivePicture) -> str:
     return f"{change}{' · '.join(terms)}{factor}"
 
 
+def loop_words(picture: LivePicture) -> str:
+    return "" if picture.is_difference else formatting.LOOP_WORDS[picture.drawn_state.loop]
+
+
 def place_words(picture: LivePicture) -> str:
-    """Format the loop and the place of the max: ``tool loop · at X 275 Y −225 Z −480``."""
+    """Format the place of the max: ``at X 275 Y −225 Z −480``."""
     node = np.unravel_index(int(np.argmax(picture.field.norm_um)), picture.shape)
     positions = picture.grid.coordinates.items()
     at = {name: float(np.broadcast_to(values, picture.shape)[node]) for name, values in positions}
     axes = formatting.point_axes(picture.drawn_state.scene, at)
-    place = [f"at {formatting.list_axes(axes)}"] if axes else []
-    loop = [] if picture.is_difference else [formatting.LOOP_WORDS[picture.drawn_state.loop]]
-    return " · ".join([*loop, *place])
+    return f"at {formatting.list_axes(axes)}" if axes else ""
 
 
 def within_limit_words(picture: LivePicture) -> tuple[str, bool]:

@@ -233,7 +233,8 @@ def _step_pieces(step: PageStep, title: str) -> tuple[Markup, Markup, Markup]:
     picture, errors = step.picture, _error_rows(step.picture)
     within = "" if picture.is_difference else f" · {legend.within_limit_words(picture)[0]}"
     factor, *looks = legend.look_words(picture)
-    headline = f"{legend.numbers_words(picture)} {legend.place_words(picture)}{within} · {factor}"
+    largest = f"{legend.numbers_words(picture)} {legend.place_words(picture)}{within}"
+    headline = " · ".join(filter(None, (largest, legend.loop_words(picture), factor)))
     subjects = [text for text in (picture.title, *legend.subject_words(picture)) if text != title]
     statistics = picture.statistics
     numbers = {"mean": statistics.mean_um, "RMS": statistics.rms_um, "P95": statistics.p95_um,

@@ -44,11 +44,11 @@ class HeadPanel(Panel):
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         subjects, place = legend.subject_words(picture), legend.place_words(picture)
         head = fill(
-            '<div data-piece="reopened"></div><h1>{numbers}</h1>'
-            '<div>{place}<span data-piece="head.kept"></span>'
+            '<div data-piece="reopened"></div><h1>{numbers} <small>{loop}</small></h1>'
+            '<div data-loop="{loop}">{place}<span data-piece="head.kept"></span>'
             '<span data-piece="head.allowed"></span></div>{words}'
             '<div data-piece="head.order"></div>',
-            numbers=legend.numbers_words(picture), place=place,
+            numbers=legend.numbers_words(picture), loop=legend.loop_words(picture), place=place,
             words=(tag("p", " · ".join(subjects), class_="ws-subject") if subjects else EMPTY)
             + legend.part_html(picture),
         )  # fmt: skip
