@@ -202,17 +202,19 @@ EOF::
 
 
 @CHAINS
-@given(machines(), st.sampled_from(LINEAR), st.lists(MICRO, min_size=4, max_size=4))
-def test_deviations_of_a_laser_are_read_along_the_axis(machine, axis, deviations):
+@given(machines(), *[st.sampled_from(LINEAR)] * 2, st.lists(MICRO, min_size=4, max_size=4))
+def test_deviations_are_read_along_programmed_directions(machine, axis, sensed, deviations):
     targets = np.round(np.linspace(*machine.workspace[axis], 4), 3)
     rows = "\n".join(f"1 {number} {um}" for number, um in enumerate(deviations, 1))
     shown = " ".join(f"{at:.3f}" for at in targets)
     rtl = RTL.format(count=4, targets=shown, axis=axis, rows=rows)
-    table = f"{axis} [mm],E{axis}{axis} [um]\n" + "\n".join(
+    table = f"{axis} [mm],E{sensed}{axis} [um]\n" + "\n".join(
         f"{at},{um}" for at, um in zip(targets, deviations, strict=True)
     )
-    along = machine.direction(axis, machine.middle)
-    for text, name, kind in ((rtl, "a.rtl", "rtl"), (table, "a.csv", "csv")):
+    for text, name, kind, along in (
+        (rtl, "a.rtl", "rtl", machine.direction(axis, machine.middle)),
+        (table, "a.csv", "csv", machine.direction(sensed, machine.middle)),
+    ):
         scene = imported(machine, text, name, kind)
         places = {**machine.middle, axis: targets}
         field = evaluate(scene, at=places, frame="workpiece", loop="relative")
@@ -252,7 +254,7 @@ def test_a_table_leaves_what_it_says(machine, name, placed):
     scene = scene_of(machine)
     options = Compensate(formats=(name,), loop="relative", placed=placed)
     placed_scene = replace(scene, placed=placed)
-    found = compensate(placed_scene, options, 7)
+    found = compensate(placed_scene, options, 3)
     nodes = machine.nodes(4)
     positions = {axis: np.array([q[axis] for q in nodes]) for axis in scene.machine.axes}
     moves = found.controller.moves(positions)
