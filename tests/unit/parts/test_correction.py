@@ -129,7 +129,7 @@ def test_words_that_do_not_lead_are_kept(dvf: Scene):
 
 @pytest.mark.parametrize(
     ("lines", "said"),
-    [(["G0 X1 Y1 Z1", "M98 P1"], "line 2: M98"), (["G0 X1 Y1 Z1", "G1 X9 R2"], "line 2: R with G1"),
+    [(["G0 X1 Y1 Z1", "M98 P1"], "line 2: M98"), (["G0 X1 Y1 Z1", "G1 X9 R2"], "line 2: R2"),
      (["G91 G1 X1"], "expected G90 and X, Y, Z before"),
      (["G0 X1 Z1", "G2 X1 I5"], "expected G90 and Y before"),
      (["G90 X1 Y1 Z1", "G55 G91 Z1"], "line 2: moves from a place not known")],
