@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping
 from typing import Literal, TypeAlias
 
 DialectName: TypeAlias = Literal["fanuc", "haas", "sinumerik", "okuma", "linuxcnc", "printer"]
-REST = "*"  # the rest of the block belongs to the word
-ALONE = "!"  # the word has another meaning in a block with axis words
+WHOLE_BLOCK = "*"  # the rest of the block belongs to the word
+NO_AXES = "!"  # the word has another meaning in a block with axis words
 MODAL_LETTERS = frozenset("NFSTDHO")  # letters that move no axis in any block
 
 
@@ -54,8 +54,8 @@ _PRINTER = (
     "EXCLUDE_OBJECT_DEFINE EXCLUDE_OBJECT_END EXCLUDE_OBJECT_START SET_PRESSURE_ADVANCE "
     "SET_PRINT_STATS_INFO SET_VELOCITY_LIMIT TIMELAPSE_TAKE_FRAME"
 )
-_KNOWN: Mapping[str, Mapping[str, str]] = {
-    "haas": {"G187": "PE!", "G103": "P!", "M82": "", "M104": "", "M105": "", "M130": REST},
+_MOTIONLESS: Mapping[str, Mapping[str, str]] = {
+    "haas": {"G187": "PE!", "G103": "P!", "M82": "", "M104": "", "M105": "", "M130": WHOLE_BLOCK},
     "sinumerik": _read_table(
         """
         G60 G500 G601 G602 G603 G621 G641 G642 G643 G644 G645 G450 G451 BRISK SOFT DRIVE:
@@ -66,7 +66,7 @@ _KNOWN: Mapping[str, Mapping[str, str]] = {
     ),
     "okuma": {"G116": "T", "M53": "", "M54": ""},
     "linuxcnc": _read_table("M62 M63 M64 M65 M66 M67 M68: PQEL"),
-    "printer": dict.fromkeys(_PRINTER.split(), REST),
+    "printer": dict.fromkeys(_PRINTER.split(), WHOLE_BLOCK),
 }
 _SIGNS: Mapping[str, str] = {
     "fanuc": r"G0*5\.1\s*Q|G0*8\s*P\d|G54\.1\s*P|G43\.4(?!\d)|G0*5\s*P10000|G68\.2|G53\.1",
@@ -111,6 +111,6 @@ def detect_dialects(lines: Iterable[str]) -> dict[str, tuple[int, str]]:
     return signs
 
 
-def known_words(dialect: str) -> Mapping[str, str]:
+def motionless_words(dialect: str) -> Mapping[str, str]:
     """Return the words of a dialect that move no axis, and the letters that belong to each."""
-    return {**_COMMON, **_KNOWN.get(dialect, {})}
+    return {**_COMMON, **_MOTIONLESS.get(dialect, {})}

@@ -52,14 +52,14 @@ from warpspace.machine.limits import (
     MIN_SPAN,
 )
 from warpspace.parts.dialects import (
-    ALONE,
     DIALECTS,
     KLARTEXT,
     MODAL_LETTERS,
-    REST,
+    NO_AXES,
+    WHOLE_BLOCK,
     DialectName,
     detect_dialects,
-    known_words,
+    motionless_words,
 )
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import check_file
@@ -285,7 +285,8 @@ class Interpreter:
         self.uncorrectable, self.used = dict[int, str](), set[str]()
         self.dialect, self.signs = "", ""
         self.handlers: Mapping[str, CodeHandler] = {}
-        self.known: Mapping[str, str] = {}
+        self.motionless: Mapping[str, str] = {}
+        self.once_codes: Mapping[str, str] = {}  # codes whose block has another motion, or none
         self.offset = dict(settings.offset)
         self.names = tuple(scene.machine.axes)
         first = [axis[0] for axis in self.names]
@@ -322,8 +323,13 @@ class Interpreter:
             listed = [f"{name} (line {line}, {sign})" for name, (line, sign) in signs.items()]
             self.signs = ", ".join(map(_shorten, listed))
         codes = {**CODES, **_DIALECT_CODES.get(self.dialect, {})}
+        self.once_codes = {
+            code: name
+            for code, name in _ONCE.items()
+            if codes.get(code) is CODES.get(code, _ignore)
+        }
         self.handlers = {code: handler for code, handler in codes.items() if handler}
-        self.known = known_words(self.dialect)
+        self.motionless = motionless_words(self.dialect)
 
     def run(self, lines: Iterable[str]) -> Iterator[str]:
         """Execute lines and return them one by one, up to the first refused word."""
@@ -387,15 +393,17 @@ class Interpreter:
             self.tokens.append((word if is_code else letter, match[0]))
             if not is_code:
                 self.read_number(match[0], letter, number, mode)
-            elif word in self.handlers or word in self.known:
+            elif word in self.handlers or word in self.motionless:
                 self.codes.append(word)
-                if self.known.get(word) == REST and word not in self.handlers:
+                if self.motionless.get(word) == WHOLE_BLOCK and word not in self.handlers:
                     self.tokens[-1] = word, text[match.start() :]
                     break
             elif word in {*self.index, *"WO"} and "G28" in self.codes and self.dialect == "printer":
                 self.words |= {word: 0.0} if word in self.index else {}
             elif other and _CONTROL_FLOW.match(other):
-                self.refuse(word, "variables, macros and calls by name are not executed")
+                self.refuse(
+                    word, "expected numbers and codes, no variables, macros or calls by name"
+                )
             elif other.startswith("("):
                 self.refuse(word, "expected the end of the comment")
             elif other and not re.fullmatch(r",[A-Z][-+.\d]*|[A-Z_]\w+", other):
@@ -403,11 +411,12 @@ class Interpreter:
                 self.refuse(shown, "expected a letter and a number")
             else:
                 tables = {
-                    name: {*known_words(name), *_DIALECT_CODES.get(name, {})} for name in DIALECTS
+                    name: {*motionless_words(name), *_DIALECT_CODES.get(name, {})}
+                    for name in DIALECTS
                 }
                 dialects = [f"--dialect {name}" for name, table in tables.items() if word in table]
-                known = "a word that is executed or moves no axis"
-                self.refuse(word, f"expected {', '.join([known, *dialects])} or --skip {word}")
+                expected = ["a word that is executed or moves no axis", *dialects]
+                self.refuse(word, f"expected {', '.join(expected)} or --skip {word}")
         if ignored:
             self.skipped.setdefault(" ".join(ignored), self.line)
 
@@ -445,7 +454,7 @@ class Interpreter:
         """Refuse letters of the block that belong to none of its codes, and axes not present."""
         claimed = {*MODAL_LETTERS}
         for code in self.codes:
-            claimed |= {*_LETTERS.get(code, ""), *self.known.get(code, "")}
+            claimed |= {*_LETTERS.get(code, ""), *self.motionless.get(code, "")}
         if self.once in {"", "G53"}:
             claimed |= {*_LETTERS[motion]}
             if motion == "G83" and self.dialect == "haas":
@@ -463,7 +472,7 @@ class Interpreter:
         motions = [code for code in self.codes if code in MOTIONS]
         if len({*motions}) > 1:
             self.refuse(motions[-1], f"expected it in another block than {motions[0]}")
-        self.once = next((_ONCE[code] for code in self.codes if code in _ONCE), "")
+        self.once = next((self.once_codes[x] for x in self.codes if x in self.once_codes), "")
         motion = motions[0] if motions else "G0" if "G80" in self.codes else self.motion
         if not self.words.keys() <= self.ordinary:
             self.check_letters(motion)
@@ -471,7 +480,7 @@ class Interpreter:
             self.remarks.setdefault(f"H{self.words['H']:g} without G43", self.line)
         if self.words.keys() & _AXES:
             for code in self.codes:
-                if code not in self.handlers and self.known[code].endswith(ALONE):
+                if code not in self.handlers and self.motionless[code].endswith(NO_AXES):
                     self.refuse(code, "expected no axis in its block")
         # X of G4 is a time
         self.letters = set[str]() if self.once == "G4" else self.words.keys() & _AXES
@@ -564,7 +573,9 @@ class Interpreter:
         number = f"D{self.words.get('D', 0.0):g}"
         self.used.add(number)
         if self.offset.get(number):
-            self.refuse(code, f"cutter radius compensation by {number} is not executed")
+            self.refuse(
+                code, f"expected --offset {number}=0: other cutter radii are not compensated"
+            )
         if number not in self.offset:
             expected = f"--offset {number}=0 where the programmed path is that of the tool centre"
             self.refuse(code, f"expected {expected}")
@@ -751,6 +762,10 @@ class Interpreter:
             self.refuse(self.motion, f"expected axes {names} in {self.scene.machine.chain}")
         if self.lost or (self.rotation != 1.0 and self.across != self.rotated_about):
             self.refuse(self.motion, "expected all positions known, and one plane with G68")
+        for letter in "IJK":
+            if self.words.get(letter) and (letter not in centres or "R" in self.words):
+                word = f"{letter}{self.words[letter]:g}"
+                self.refuse(word, f"expected either R or {' and '.join(centres)}")
         start = complex(*(self.position[self.index[x]] for x in names))
         offset = self.rotation * complex(*map(self.centre_offset, names, centres))
         self.position = [to.get(index, at) for index, at in enumerate(self.position)]

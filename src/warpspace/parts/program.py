@@ -453,18 +453,17 @@ def correct_program(analysis: Program, program: ParsedProgram) -> Iterator[str]:
     missing = ", ".join(linear - state.index.keys())
     if missing:
         raise OptionError(f"no word moves axis {missing}; expected one axis of each letter")
-    named, mode, header, number = set[str](), ("", False), _header(scene, analysis), 0
+    named, mode, number = set[str](), ("", False), 0
+    header = _header(scene, analysis, program.dialect)
     for number, line in enumerate(state.run(lines), start=1):
         codes, letters = {*state.codes}, state.words.keys() & state.index.keys()
         if codes or state.words:
             yield from header  # once
         if mode != (state.system, state.tcp):
             mode, named = (state.system, state.tcp), set()
-        if state.once in {"G28", "G30", "G53"}:
+        if state.once in {"G28", "G30", "G53", "G10", "G52"}:
             named -= letters or named
-        elif state.once in {"G10", "G52"}:
-            named = set[str]()
-        elif codes & {"M6", "G234", *interpreter.COMPENSATING} or "D" in state.words:
+        elif codes & {"M6", "G56", *interpreter.COMPENSATING} or "D" in state.words:
             named -= {"Z"}
         places_here = np.arange(*np.searchsorted(line_of, [number, number + 1]))
         moving = places_here[program.kind[row[places_here]] != interpreter.STAND]
@@ -487,18 +486,21 @@ def correct_program(analysis: Program, program: ParsedProgram) -> Iterator[str]:
     yield from (line.rstrip() for line in lines[number:])
 
 
-def _header(scene: Scene, analysis: Program) -> Iterator[str]:
+def _header(scene: Scene, analysis: Program, dialect: str) -> Iterator[str]:
     digest = sha256(scene_to_toml(scene).encode()).hexdigest()[:12]
     title = f"{scene.title[:80]}, chain {scene.machine.chain}, errors {digest}"
-    yield format_comment("(", f"corrected for {title}", ")")
-    setup = "".join(f", {name}={value:g}" for name, value in analysis.offset)
-    setup += f", ignored words {' '.join(analysis.skip)}" * bool(analysis.skip)
-    if analysis.dialect != "auto":
-        setup += f", dialect {analysis.dialect}"
+    setup = [f"{name}={value:g}" for name, value in analysis.offset]
+    setup += [f"dialect {dialect}"] * bool(dialect)
+    setup += [f"ignored words {' '.join(analysis.skip)}"] * bool(analysis.skip)
     if analysis.least_increment:
-        setup += f", least increment {analysis.least_increment:g}"
-    yield f"(TCP {analysis.tcp}, length {analysis.length_mm:g} mm{setup})"
-    yield f"(within {analysis.within_um:g} um between points; geometry only)"
+        setup.append(f"least increment {analysis.least_increment:g}")
+    marks = (";", "") if dialect == "sinumerik" else ("(", ")")
+    for text in (
+        f"corrected for {title}",
+        ", ".join([f"TCP {analysis.tcp}", f"length {analysis.length_mm:g} mm", *setup]),
+        f"within {analysis.within_um:g} um between points; geometry only",
+    ):
+        yield format_comment(marks[0], text, marks[1])
     yield "G90"
 
 
@@ -508,7 +510,7 @@ def _blocks(
     """Write the current line of a control as straight blocks to places, [n, a]."""
     number = [word for key, word in state.tokens if key == "N"]
     replaced = _MODES | _LAST | {"N", "G0", "G1", *state.index}
-    replaced |= {*("KLPQR" if state.cycle else ""), *("F" if state.inverse_time else "")}
+    replaced |= {"CR", *("IJKLPQR" if state.cycle else ""), *("F" if state.inverse_time else "")}
     replaced |= {*("IJKPR" if state.motion in {"G2", "G3"} else "")}
     other_words = [word for key, word in state.tokens if key not in replaced]
     last = [code for code in state.codes if code in _LAST]
