@@ -8,7 +8,9 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Literal, TypeAlias
 
-DialectName: TypeAlias = Literal["fanuc", "haas", "sinumerik", "okuma", "linuxcnc", "printer"]
+DialectName: TypeAlias = Literal[
+    "auto", "fanuc", "haas", "sinumerik", "okuma", "linuxcnc", "printer"
+]
 WHOLE_BLOCK = "*"  # the rest of the block belongs to the word
 NO_AXES = "!"  # the word has another meaning in a block with axis words
 MODAL_LETTERS = frozenset("NFSTDHO")  # letters that move no axis in any block

@@ -79,7 +79,7 @@ _NUMBER = r"[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)"
 WORD = re.compile(
     rf"([A-Z])\s*+({_NUMBER})(?![.\d#\[=]|E\d++(?![.\d]))"  # a letter, its number
     r"|\([^()]*+\)|;.*+"  # comments
-    rf"|(CR|[A-Z]|[SM]\d)\s*+=\s*+(?:([AI]C)\s*+\()?\s*+({_NUMBER}|\"[^\"]*+\")(?(4)\s*+\))"
+    rf"|(CR|[A-Z]|S\d)\s*+=\s*+(?:([AI]C)\s*+\()?\s*+({_NUMBER}|\"[^\"]*+\")(?(4)\s*+\))"
     r"(?![^\s;(])"  # an assignment of SINUMERIK
     r"|(\S[^\s(;]*+)",  # anything else
     re.IGNORECASE | re.ASCII,
@@ -141,8 +141,8 @@ class ControlSettings:
         0.0, "Length of the tool beyond the tool point of the scene", unit="mm",
         low=-MAX_TOOL_MM, high=MAX_TOOL_MM,
     )  # fmt: skip
-    dialect: Literal["auto"] | DialectName = option(
-        "auto", "Dialect of the program, which decides on the meaning of words; auto: by its words"
+    dialect: DialectName = option(
+        "auto", "Dialect of the program, which determines the meaning of words; auto: by its words"
     )
     skip: Annotated[tuple[str, ...], Grammar("WORD,..", _skipped_words, many=True)] = option(
         (), "Words to ignore, each with the rest of its block up to the next G or M code;"
@@ -316,7 +316,7 @@ class Interpreter:
 
     def choose_dialect(self, lines: Iterable[str]) -> None:
         """Set the dialect, from the options or from its signs in the program."""
-        self.dialect = self.settings.dialect
+        self.dialect: str = self.settings.dialect
         if self.dialect == "auto":
             signs = detect_dialects(lines)
             self.dialect = next(iter(signs)) if len(signs) == 1 else ""
@@ -350,7 +350,7 @@ class Interpreter:
             self.codes, self.words, self.tokens = [], {}, []
             self.integers, self.modes = set[str](), {}
             self.skip, self.once, text = "", "", raw.replace("\0", "").strip()
-            if text.startswith("%") and self.has_blocks:
+            if text.startswith("%") and self.has_blocks and not self.calls:
                 return
             skipped = _SKIP.fullmatch(text)
             if skipped:
@@ -371,6 +371,9 @@ class Interpreter:
             self.has_blocks = self.has_blocks or bool(self.codes or self.words)
             if {"M2", "M30"} & {*self.codes} or len(self.refused) > MAX_REMARKS:
                 return
+        if self.calls and not self.refused:
+            self.refused[self.line] = program[-1].strip()[:MAX_SHOWN]
+            self.reasons[self.line] = "; expected M99 at the end of the subprogram"
 
     def read_words(self, text: str) -> None:
         """Read the words and comments of a block."""
@@ -427,7 +430,7 @@ class Interpreter:
             is_text = number.startswith('"')
             if self.dialect != "sinumerik" or (is_text and letter != "T"):
                 self.refuse(_shorten(word.upper()), "expected a letter and a number")
-            letter, number = ("R" if letter == "CR" else letter), "0" if is_text else number
+            letter, number = "R" if letter == "CR" else letter[0], "0" if is_text else number
             self.modes[letter] = mode
         limit = MAX_LENGTH_MM if letter in _POSITIONS else MAX_WORD
         value = float(number)

@@ -445,7 +445,8 @@ def _corrected(program: ParsedProgram, count: Integers) -> tuple[Integers, Array
 def correct_program(analysis: Program, program: ParsedProgram) -> Iterator[str]:
     """Write the lines of a program with which this machine cuts the nominal path of another."""
     for line, word in {**program.refused, **program.uncorrectable}.items():
-        raise OptionError(f"line {line}: {word}; a corrected program cannot contain it")
+        reason = program.reasons.get(line, "; expected no such word in a program to be corrected")
+        raise OptionError(f"line {line}: {word}{reason}")
     row, places = corrected_places(program, analysis.within_um / 1e3)
     scene, lines, line_of = program.scene, [*analysis.lines()], program.line[row]
     state = interpreter.Interpreter(scene, analysis, analysis.file or "")

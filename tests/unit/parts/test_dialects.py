@@ -40,7 +40,7 @@ START = "G21 G90 G17\nG0 X0 Y0 Z0\nG1 X10 F100\n"
 )  # fmt: skip
 def test_the_path_ends_before_a_word_that_is_not_known(tmp_path: Path, block: str, word: str):
     result = run(f"{START}{block}\nG1 X500 Y500")
-    assert next(iter(result.program.refused.items())) == (4, word)
+    assert next(iter(result.program.refused.values())) == word
     assert result.length_mm == pytest.approx(10.0)
     (tmp_path / "a.nc").write_text(f"{START}{block}\nG1 X500 Y500")
     files = [str(tmp_path / "a.nc"), "-o", str(tmp_path / "b.nc")]
@@ -189,3 +189,22 @@ def test_programs_in_utf16_are_read(tmp_path: Path):
     path.write_text("%\nO1\nG0 X0 Y0 Z10.\nG1 X50. F300\n", "utf-16")
     program = Program(file=str(path))
     assert program.run(warpspace.load_scene(MILL), ignore_progress).length_mm == pytest.approx(50.0)
+
+
+def test_a_subprogram_without_its_end_is_refused():
+    result = run(f"{START}M98 P8\nM30\nO8\nX20")
+    assert result.program.refused == {7: "X20"}
+    assert result.program.reasons[7] == "; expected M99 at the end of the subprogram"
+
+
+def test_the_command_line_reads_dialect_and_words_to_skip(tmp_path: Path):
+    (tmp_path / "a.nc").write_text(f"{START}TRANS X100 Y50\nM777\nX20\n")
+    arguments = ["program", MILL, str(tmp_path / "a.nc")]
+    skip = ["--skip", "TRANS,M777", "--dialect", "sinumerik"]
+    text = CliRunner().invoke(cli, [*arguments, *skip]).output
+    assert "Ignored because of --skip: TRANS X100 Y50" in text
+    assert "3 blocks, 20.0 mm" in text
+    assert (
+        "is not one of 'auto', 'fanuc'"
+        in CliRunner().invoke(cli, [*arguments, "--dialect", "x"]).output
+    )
