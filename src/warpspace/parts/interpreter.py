@@ -24,7 +24,7 @@ from cmath import exp, phase
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import islice, pairwise
-from math import ceil, copysign, sqrt, tau
+from math import ceil, copysign, sqrt, tan, tau
 from pathlib import Path
 from typing import Annotated, Literal, NoReturn, TypeAlias
 
@@ -89,12 +89,13 @@ _HEADER = re.compile(  # lines before the first block
     r"%.*+|\$[^%\s]++%|O?<[^<>]++>\s*+(\([^()]*+\)\s*+)*+|[O:]\s*+\d++\s*+(\([^()]*+\)\s*+)*+",
     re.IGNORECASE,
 )
+_CORNER = re.compile(rf"(,[RC])\s*+({_NUMBER})")
 _LABEL = re.compile(r"\s*+(?:/\d?\s*+)?+(?:([O:N])\s*+0*+(\d++))", re.IGNORECASE)
 _CONTROL_FLOW = re.compile(r".*[#\[<=]|GOTO|IF|WHILE|FOR|LOOP|REPEAT|CALL")
 _AXES, _POSITIONS = frozenset("XYZUVWABC"), frozenset("XYZUVWABCIJKRQ")
 _CYCLE_LETTERS = "RQPKL"
 _LETTERS = {  # beside axes, by the code that they belong to
-    "G0": "E", "G1": "E", **dict.fromkeys(("G2", "G3"), "IJKRPE"),
+    "G0": ["E"], "G1": ["E", ",R", ",C"], **dict.fromkeys(("G2", "G3"), "IJKRPE"),
     **dict.fromkeys(CYCLES, _CYCLE_LETTERS),
     "G4": "PXUFS", "G10": "LPR", "G54.1": "P", "G154": "P", "G68": "R", "G92": "E",
     "M98": "PL", "M97": "PL",
@@ -303,6 +304,7 @@ class Interpreter:
         self.once = ""  # non-modal code of the block, such as G4, G28 or G53
         self.letters: Set[str] = set[str]()  # axes that the block names
         self.cycle: dict[str, float] = {}  # words of a cycle, and the level before it, mm
+        self.corner: tuple[str, float, int] | None = None  # of the last move: ",R", mm, its row
         self.calls, self.next_line = list[tuple[int, int, int]](), 0  # of subprograms
         self.labels: dict[tuple[str, float], int] = {}
         self.ordinary = (MODAL_LETTERS - {"H"}) | self.index.keys()  # checked no further
@@ -403,6 +405,9 @@ class Interpreter:
                     break
             elif word in {*self.index, *"WO"} and "G28" in self.codes and self.dialect == "printer":
                 self.words |= {word: 0.0} if word in self.index else {}
+            elif corner := _CORNER.fullmatch(word):
+                self.tokens[-1] = corner[1], match[0]
+                self.read_number(word, corner[1], corner[2], "")
             elif other and _CONTROL_FLOW.match(other):
                 self.refuse(
                     word, "expected numbers and codes, no variables, macros or calls by name"
@@ -432,7 +437,7 @@ class Interpreter:
                 self.refuse(_shorten(word.upper()), "expected a letter and a number")
             letter, number = "R" if letter == "CR" else letter[0], "0" if is_text else number
             self.modes[letter] = mode
-        limit = MAX_LENGTH_MM if letter in _POSITIONS else MAX_WORD
+        limit = MAX_LENGTH_MM if letter[-1] in _POSITIONS else MAX_WORD
         value = float(number)
         if len(number) > MAX_SHOWN or abs(value) > limit:
             unit = " mm or degrees" * (letter in _POSITIONS)
@@ -443,7 +448,7 @@ class Interpreter:
         if letter in self.words:
             self.refuse(shown, f"expected {letter} once in a line")
         self.words[letter] = value
-        if letter in _POSITIONS and "." not in number:
+        if letter[-1] in _POSITIONS and "." not in number:
             self.integers.add(letter)
 
     def fail(self, problem: str) -> NoReturn:
@@ -493,6 +498,8 @@ class Interpreter:
             if code in self.handlers:
                 self.handlers[code](self, code)
         self.cycle = self.cycle if self.motion in CYCLES else {}
+        if self.corner and (self.once or (self.letters and self.motion != "G1")):
+            self.refuse(self.once or self.motion, f"expected G1 after a corner {self.corner[0]}")
         is_arc = self.motion in {"G2", "G3"} and self.words.keys() & {*"IJKR"}
         if self.once in {"G28", "G30"}:
             self.move_home()
@@ -747,8 +754,45 @@ class Interpreter:
             kind = STAND
         elif kind == FEED:  # from here on it is cut
             self.unnamed_axes.clear()
+        if self.corner and self.motion == "G1":
+            self.cut_corner(before, kind)
         self.record(kind)
+        for letter in {",R", ",C"} & self.words.keys():
+            if kind != FEED or self.tcp:
+                self.refuse(letter, "expected a move by G1 without tool centre point")
+            self.corner = letter, self.value(letter), len(self.rows) // self.width - 1
         self.switch(tcp=tcp, length_mm=self.length_mm)
+
+    def cut_corner(self, at: Sequence[float], kind: int) -> None:
+        """Round or chamfer the corner between the last move and the one to the position."""
+        letter, size, row = self.corner or ("", 0.0, 0)
+        self.corner = None
+        indices = [self.index[x] for x in PLANES[self.across] if x in self.index]
+        first = self.rows[(row - 1) * self.width + 8 : row * self.width]
+        flat = [complex(*(place[i] for i in indices)) for place in (first, at, self.position)]
+        arrival, departure = flat[1] - flat[0], flat[2] - flat[1]
+        others = {*range(len(self.names))} - {*indices}
+        is_flat = all(first[i] == at[i] == self.position[i] for i in others)
+        if not is_flat or kind != FEED or not arrival or not departure:
+            self.refuse(letter, "expected two moves in the plane")
+        angle = phase(departure / arrival)
+        length = size * tan(abs(angle) / 2.0) if letter == ",R" else size
+        limit = min(abs(arrival), abs(departure))
+        if size <= 0.0 or length > limit:
+            self.refuse(f"{letter}{size:g}", f"expected a corner within moves of {limit:.4f} mm")
+        starts = flat[1] - length * arrival / abs(arrival)
+        ends = flat[1] + length * departure / abs(departure)
+        for index, coordinate in zip(indices, (starts.real, starts.imag), strict=True):
+            self.rows[row * self.width + 8 + index] = coordinate
+        target, self.position = self.position, [*at]
+        for index, coordinate in zip(indices, (ends.real, ends.imag), strict=True):
+            self.position[index] = coordinate
+        centre = starts + copysign(size, angle) * 1j * arrival / abs(arrival)
+        if letter == ",R" and angle:
+            self.record(ARC, angle, centre)
+        else:
+            self.record(FEED)
+        self.position = target
 
     def centre_offset(self, name: str, letter: str) -> float:
         """Return the offset of the centre of an arc from its start along an axis."""

@@ -511,7 +511,13 @@ def _blocks(
     """Write the current line of a control as straight blocks to places, [n, a]."""
     number = [word for key, word in state.tokens if key == "N"]
     replaced = _MODES | _LAST | {"N", "G0", "G1", *state.index}
-    replaced |= {"CR", *("IJKLPQR" if state.cycle else ""), *("F" if state.inverse_time else "")}
+    replaced |= {
+        "CR",
+        ",R",
+        ",C",
+        *("IJKLPQR" if state.cycle else ""),
+        *("F" if state.inverse_time else ""),
+    }
     replaced |= {*("IJKPR" if state.motion in {"G2", "G3"} else "")}
     other_words = [word for key, word in state.tokens if key not in replaced]
     last = [code for code in state.codes if code in _LAST]

@@ -135,6 +135,7 @@ def test_words_that_do_not_lead_are_kept(dvf: Scene):
         "(HAAS)\nG0 X0 Y0 Z-200\nG83 X5. Z-220 R-202 I8 J2 K3\nX9\nG80\nG98 G85 X5 Z-220 R-202",
         "G500 G0 X0 Y0 Z-200 D0\nZ-150 D1\nG1 X10\nG2 X0 Y-10 I=AC(10) J=AC(-10)\nX-9 Y-1 CR=15",
         "G0 X0 Y0 Z-400\nG56 H1 Z-300\nG1 X30\nG53\nG1 X9 Z-310",
+        "G0 X0 Y0 Z-200\nG1 X50 ,R5.\nY50 ,C2.\nX0",
         "G0 X0 Y0 Z-200\nTRANS X5 Y5\nG1 X9 M777\nX3",
     ],
 )

@@ -33,7 +33,7 @@ START = "G21 G90 G17\nG0 X0 Y0 Z0\nG1 X10 F100\n"
         ("G7.1 C50", "G7.1"), ("M777 X500 Y500", "M777"), ("G68.1 R45", "G68.1"),
         ("G71 I30 J0 K30 L4", "G71"), ("G50.1 X0", "G50.1"), ("G50 X3", "G50"),
         ("G254", "G254"), ("CYCLE800(1,\"TC1\",0)", "CYCLE800"), ("MCALL CYCLE83(1)", "MCALL"),
-        ("G1 X50 ,R5.", ",R5."), ("G1 X50 A5", "A5"), ("G58 X10 Y20", "G58"), ("R1=5", "R1=5"),
+        ("G1 X50 ,B5.", ",B5."), ("G1 X50 A5", "A5"), ("G58 X10 Y20", "G58"), ("R1=5", "R1=5"),
         ("G83 Z-5. R1.", "G83"), ("G83 Z-5. R1. Q0.", "G83"), ("G83 Z-5 R1 Q1 K0.2", "K0.2"),
         ("ROT RPL=45", "ROT"), ("M98 P7", "M98 P7"), ("G41 D1 X9", "G41"), ("X=R1", "X=R1"),
     ],
@@ -114,6 +114,9 @@ def test_a_printer_executes_the_file_of_a_slicer(text: str, length: float):
         ("G0 X0 Y0 Z0\nG54.1 P3 X1", {"G54.1P3X": 8.0}, 9.0),
         ("G0 X0 Y0 Z0\nG154 P3 X1", {"G54.1P3X": 8.0}, 9.0),
         ("G0 X0 Y0 Z0\nG1 G41 D1 X9", {"D1": 0.0}, 9.0),
+        # corners, also without blanks
+        ("G0 X0 Y0 Z0\nG1 X50 ,R5. F300\nY50,C2.\nX0", {}, 45 + 2.5 * math.pi + 43 + 8**0.5 + 48),
+        ("G0X0Y0Z0\nG1X-30.,R10.\nY-30.", {}, 40 + 5 * math.pi),
         # rotation in the plane
         ("G0 X0 Y0 Z0\nG68 X0 Y0 R90.\nG1 X10 Y0\nX10 Y5\nG69\nX0 Y0", {}, 15 + math.hypot(10, 5)),
         # cycles: G83 K according to Haas, pecks of I, J, K; up at the feed; reference point 2
