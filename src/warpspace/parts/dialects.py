@@ -5,7 +5,7 @@ that belong to it), or unknown: then the path ends before its block.
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import Literal, TypeAlias
 
 DialectName: TypeAlias = Literal[
@@ -30,7 +30,7 @@ _COMMON = _read_table(
     M0 M1 M2 M30 M60: P
     M3 M4 M5 M13 M14 M19: SPR
     M6 M61: TQ
-    M7 M8 M9 M10 M11 M12 M16 M17 M18 M21 M22 M23 M24 M25 M26 M27 M28:
+    M7 M8 M9 M10 M11 M12 M16 M17 M18:
     M29: S
     M31 M33 M34 M35 M36 M39 M40 M41 M42 M43 M44 M45 M48 M49 M50 M51 M52 M53 M54 M55 M56: P
     M57 M58 M59 M78 M79 M80 M81 M83 M84 M85 M86 M88 M89: P
@@ -57,7 +57,13 @@ _PRINTER = (
     "SET_PRINT_STATS_INFO SET_VELOCITY_LIMIT TIMELAPSE_TAKE_FRAME"
 )
 _MOTIONLESS: Mapping[str, Mapping[str, str]] = {
-    "haas": {"G187": "PE!", "G103": "P!", "M82": "", "M104": "", "M105": "", "M130": WHOLE_BLOCK},
+    "haas": _read_table(
+        """
+        M21 M22 M23 M24 M25 M26 M27 M28 M82 M104 M105:
+        G103: P!
+        G187: PE!
+        """
+    ),
     "sinumerik": _read_table(
         """
         G60 G500 G601 G602 G603 G621 G641 G642 G643 G644 G645 G450 G451 BRISK SOFT DRIVE:
@@ -92,6 +98,7 @@ def _any_of(patterns: Mapping[str, str]) -> re.Pattern[str]:
 
 
 _SIGN, _COMMENT_SIGN = _any_of(_SIGNS), _any_of(_COMMENTS)
+_EXTRUSION = re.compile(r"G0*(?:[0-3]|92)(?!\d)[^;(]*E-?\.?\d|M20[1-5][^;(]*E\d", re.IGNORECASE)
 _COMMENT = re.compile(r"\([^()]*+\)?+|;.*+")
 _PLAIN = re.compile(  # without a sign; faster
     r"(?:N\d++\s*+)?+(?:G0?[0-3]\s*+)?+(?:[XYZABCEFIJKS]\s*+[+-]?[\d.]++\s*+)*+", re.IGNORECASE
@@ -100,7 +107,7 @@ DIALECTS = tuple(_SIGNS)
 KLARTEXT = re.compile(r"\s*+(?:\d+\s+)?BEGIN\s+PGM\b", re.IGNORECASE)
 
 
-def detect_dialects(lines: Iterable[str]) -> dict[str, tuple[int, str]]:
+def detect_dialects(lines: Sequence[str]) -> dict[str, tuple[int, str]]:
     """Find the dialects whose signs a program contains: first line and sign of each."""
     signs: dict[str, tuple[int, str]] = {}
     for line, text in enumerate(lines, start=1):
@@ -110,6 +117,9 @@ def detect_dialects(lines: Iterable[str]) -> dict[str, tuple[int, str]]:
         for pattern, part in ((_COMMENT_SIGN, stripped), (_SIGN, _COMMENT.sub(" ", stripped))):
             for match in pattern.finditer(part):
                 signs.setdefault(match.lastgroup or "", (line, match[0].strip()))
+    # codes of printers occur on mills, extrusion does not
+    if "printer" in signs and not any(map(_EXTRUSION.search, lines)):
+        del signs["printer"]
     return signs
 
 

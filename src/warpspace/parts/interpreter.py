@@ -316,7 +316,7 @@ class Interpreter:
         self.record(STAND)
         self.switch(tcp=settings.tcp == "always", length_mm=settings.length_mm)
 
-    def choose_dialect(self, lines: Iterable[str]) -> None:
+    def choose_dialect(self, lines: Sequence[str]) -> None:
         """Set the dialect, from the options or from its signs in the program."""
         self.dialect: str = self.settings.dialect
         if self.dialect == "auto":
@@ -405,9 +405,9 @@ class Interpreter:
                     break
             elif word in {*self.index, *"WO"} and "G28" in self.codes and self.dialect == "printer":
                 self.words |= {word: 0.0} if word in self.index else {}
-            elif corner := _CORNER.fullmatch(word):
-                self.tokens[-1] = corner[1], match[0]
-                self.read_number(word, corner[1], corner[2], "")
+            elif _CORNER.fullmatch(word):
+                self.tokens[-1] = word[:2], match[0]
+                self.read_number(word, word[:2], word[2:].strip(), "")
             elif other and _CONTROL_FLOW.match(other):
                 self.refuse(
                     word, "expected numbers and codes, no variables, macros or calls by name"
@@ -415,8 +415,8 @@ class Interpreter:
             elif other.startswith("("):
                 self.refuse(word, "expected the end of the comment")
             elif other and not re.fullmatch(r",[A-Z][-+.\d]*|[A-Z_]\w+", other):
-                shown = word if word.isprintable() else repr(word)
-                self.refuse(shown, "expected a letter and a number")
+                spelling = word if word.isprintable() else repr(word)
+                self.refuse(spelling, "expected a letter and a number")
             else:
                 tables = {
                     name: {*motionless_words(name), *_DIALECT_CODES.get(name, {})}
@@ -430,7 +430,7 @@ class Interpreter:
 
     def read_number(self, word: str, letter: str, number: str, mode: str) -> None:
         """Read a letter and its number, or an assignment of SINUMERIK."""
-        shown = f"{letter}{_shorten(number)}"
+        spelling = f"{letter}{_shorten(number)}"
         if "=" in word:
             is_text = number.startswith('"')
             if self.dialect != "sinumerik" or (is_text and letter != "T"):
@@ -442,11 +442,11 @@ class Interpreter:
         if len(number) > MAX_SHOWN or abs(value) > limit:
             unit = " mm or degrees" * (letter in _POSITIONS)
             expected = f"at most ±{limit:.8g}{unit}, in up to {MAX_SHOWN} characters"
-            self.refuse(shown, f"expected {expected}")
+            self.refuse(spelling, f"expected {expected}")
         if letter == "O":
-            self.refuse(shown, "expected one program or subprogram, ended by M30 or M99")
+            self.refuse(spelling, "expected one program or subprogram, ended by M30 or M99")
         if letter in self.words:
-            self.refuse(shown, f"expected {letter} once in a line")
+            self.refuse(spelling, f"expected {letter} once in a line")
         self.words[letter] = value
         if letter[-1] in _POSITIONS and "." not in number:
             self.integers.add(letter)
@@ -516,10 +516,10 @@ class Interpreter:
         """Continue at a subprogram or after its call, or end the program."""
         self.uncorrectable.setdefault(self.line, code)
         if code == "M99":
-            start, repeats, back = self.calls.pop() if self.calls else (0, 0, MAX_LINES)
-            self.next_line = start if repeats else back
+            start, repeats, caller = self.calls.pop() if self.calls else (0, 0, MAX_LINES)
+            self.next_line = start if repeats else caller
             if repeats:
-                self.calls.append((start, repeats - 1, back))
+                self.calls.append((start, repeats - 1, caller))
             return
         kind, number, repeats = "NO"[code == "M98"], self.words.get("P", 0.0), self.count("L")
         if (kind, number) not in self.labels and "L" not in self.words:
@@ -652,8 +652,8 @@ class Interpreter:
         if "R" not in self.words or (self.letters and self.letters != {*names}):
             self.refuse(code, f"expected R, and both {names[0]} and {names[1]} or neither")
         self.uncorrectable.setdefault(self.line, code)
-        here = complex(*(self.position[self.index[x]] - self.place(x, 0.0) for x in names))
-        self.pivot = complex(*map(self.value, names)) if self.letters else here
+        start = complex(*(self.position[self.index[x]] - self.place(x, 0.0) for x in names))
+        self.pivot = complex(*map(self.value, names)) if self.letters else start
         self.rotation = exp(1j * tau * self.value("R") / FULL_TURN_DEG)
         self.rotated_about = self.across
         self.needs_both = True
@@ -721,15 +721,15 @@ class Interpreter:
         """Rotate the target in the plane of G68."""
         zero = complex(*(self.place(x, 0.0) for x in names)) + self.pivot
         indices = [self.index[x] for x in names]
-        here = complex(*(self.position[index] for index in indices)) - zero
+        start = complex(*(self.position[index] for index in indices)) - zero
         if self.absolute:
-            before = here / self.rotation + zero
+            before = start / self.rotation + zero
             first, second = indices
             new = complex(to.get(first, before.real), to.get(second, before.imag))
             turned = zero + self.rotation * (new - zero)
         else:
             step = complex(*(to.get(i, self.position[i]) - self.position[i] for i in indices))
-            turned = zero + here + self.rotation * step
+            turned = zero + start + self.rotation * step
         to |= dict(zip(indices, (turned.real, turned.imag), strict=True))
 
     def line_to(self, to: Mapping[int, float], kind: int = STAND, *, bare: bool = False) -> None:
@@ -771,8 +771,8 @@ class Interpreter:
         first = self.rows[(row - 1) * self.width + 8 : row * self.width]
         flat = [complex(*(place[i] for i in indices)) for place in (first, at, self.position)]
         arrival, departure = flat[1] - flat[0], flat[2] - flat[1]
-        others = {*range(len(self.names))} - {*indices}
-        is_flat = all(first[i] == at[i] == self.position[i] for i in others)
+        across = {*range(len(self.names))} - {*indices}
+        is_flat = all(first[i] == at[i] == self.position[i] for i in across)
         if not is_flat or kind != FEED or not arrival or not departure:
             self.refuse(letter, "expected two moves in the plane")
         angle = phase(departure / arrival)

@@ -365,9 +365,9 @@ class ProgramResult(Result):
         for listing, title in (
             (program.skipped, "ignored because of --skip"), (program.remarks, "remarks")
         ):  # fmt: skip
-            words = [f"{word} (line {line})" for word, line in listing.items()]
-            if words:
-                yield f"{title}: {', '.join(words[:MAX_LISTED])}"
+            entries = [f"{word} (line {line})" for word, line in listing.items()]
+            if entries:
+                yield f"{title}: {', '.join(entries[:MAX_LISTED])}"
         if program.unused:
             yield f"unused: --offset {', '.join(program.unused)}"
         if program.signs and not program.dialect:
