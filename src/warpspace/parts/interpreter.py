@@ -418,13 +418,13 @@ class Interpreter:
                 spelling = word if word.isprintable() else repr(word)
                 self.refuse(spelling, "expected a letter and a number")
             else:
-                tables = {
-                    name: {*motionless_words(name), *_DIALECT_CODES.get(name, {})}
+                dialects = [
+                    f", --dialect {name}"
                     for name in DIALECTS
-                }
-                dialects = [f"--dialect {name}" for name, table in tables.items() if word in table]
-                expected = ["a word that is executed or moves no axis", *dialects]
-                self.refuse(word, f"expected {', '.join(expected)} or --skip {word}")
+                    if word in motionless_words(name) or _DIALECT_CODES.get(name, {}).get(word)
+                ]
+                options = "".join(dialects) + f", or --skip {word}"
+                self.refuse(word, f"expected a word that is executed or moves no axis{options}")
         if ignored:
             self.skipped.setdefault(" ".join(ignored), self.line)
 
