@@ -9,6 +9,7 @@ from warpspace.calibration import Calibrate, read_readings
 from warpspace.calibration.next_best import u95_at
 from warpspace.calibration.solve import build_fit_parameters
 from warpspace.exceptions import OptionError
+from warpspace.parts.refinement import refine
 from warpspace.parts.workpiece import load_workpiece, place_workpiece
 from warpspace.scene.library import load_scene
 from warpspace.scene.model import PartSource
@@ -42,8 +43,9 @@ def test_a_part_is_as_unsure_as_its_vertices_and_its_verdict_as_its_width(tmp_pa
     scene = replace(SCENE, part=replace(SCENE.part, place=place))
     terms = build_fit_parameters(scene, ["EXX:ramp", "EZZ:ramp"])
     covariance = np.diag([9.0, 1e-18])
-    x = place_workpiece(load_workpiece(mesh), scene).vertices_mm[:, 0]
-    wanted = 2.0 * 3.0 * x.std() / 550.0
+    fine, _ = refine(load_workpiece(mesh), scene)
+    x = place_workpiece(fine, scene).vertices_mm[:, 0]
+    wanted = 2.0 * 3.0 * np.sqrt(fine.shares @ (x - fine.shares @ x) ** 2) / 550.0
     assert u95_at(scene, terms, "part")(covariance) == pytest.approx(wanted, rel=1e-3)
     own = PartSource(mesh, place, features="f.toml", folder=str(tmp_path))
     wanted = 2.0 * 3.0 * 160.0 / 550.0 if place[-1] == 0.0 else 0.0  # turned, it lies along y

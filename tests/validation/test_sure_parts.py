@@ -57,12 +57,19 @@ def cube(text, **more):
 
 def test_the_deviation_of_a_part_is_as_unsure_as_its_errors():
     _, told = cube(STATED)
-    lengths = {"deviation": (told["deviation"], 50.0)}
-    lengths["placed"] = told["placed"]["deviation"], math.hypot(50.0, 50.0) / 2.0
-    for numbers, arm in lengths.values():
-        for name in ("mean", "rms", "p95", "max"):
-            assert numbers[f"{name}_um"] == pytest.approx(20.0 * arm * 1e-3)
-            assert numbers[f"u95_{name}_um"] == pytest.approx(2.0 * U * arm * 1e-3)
+    middle = (np.arange(100) + 0.5) - 50.0  # x and y of six sides, evenly
+    x, y = np.broadcast_arrays(middle[:, None], middle)
+    side = np.full_like(x, 50.0)
+    sides = np.array([(side, y), (side, y), (x, side), (x, side), (x, y), (x, y)])
+    arms = {"deviation": np.abs(sides[:, 1]), "placed": np.hypot(*np.moveaxis(sides, 1, 0)) / 2.0}
+    for state, arm in arms.items():
+        numbers = told["deviation"] if state == "deviation" else told["placed"]["deviation"]
+        rms = np.sqrt(np.mean(arm**2))
+        most = math.hypot(50.0, 50.0) / 2.0 if state == "placed" else 50.0
+        expected = {"mean": arm.mean(), "rms": rms, "p95": np.quantile(arm, 0.95), "max": most}
+        for name, length in expected.items():
+            assert numbers[f"{name}_um"] == pytest.approx(20.0 * length * 1e-3, rel=0.01)
+            assert numbers[f"u95_{name}_um"] == pytest.approx(2.0 * U * length * 1e-3, rel=0.01)
     for feature in told["features"]:  # planes stay flat, whatever the squareness
         flatness = feature["measures"]["flatness"]
         assert flatness["u95_placed_difference_um"] == pytest.approx(0.0, abs=1e-9)

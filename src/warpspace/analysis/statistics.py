@@ -71,11 +71,18 @@ def volume_mean(values: Array, grid: Grid) -> float:
     return float(np.sum(grid.weights * values.reshape(grid.shape)))
 
 
-def statistics(field: ErrorField, axes: Mapping[str, Array] | None = None) -> Statistics:
+def statistics(
+    field: ErrorField, axes: Mapping[str, Array] | None = None, shares: Array | None = None
+) -> Statistics:
+    """Summarise points, of equal weights or of given shares, [n], whose sum is 1."""
     norm = field.norm_um
     if norm.size == 0:
         raise OptionError("statistics of no points; expected at least one")
     flat = norm.reshape(-1)
+    if shares is not None:
+        rms = float(np.sqrt(shares @ (flat * flat)))
+        p95 = _weighted_p95(flat, shares)
+        return _summed_up(norm, float(shares @ flat), rms, p95, field.nominal_mm, axes or {})
     rms = float(np.sqrt(flat @ flat / flat.size))
     p95 = _percentile(flat, P95 * (flat.size - 1))
     return _summed_up(norm, float(flat.mean()), rms, p95, field.nominal_mm, axes or {})
@@ -119,6 +126,16 @@ def _percentile(values: Array, place: float) -> float:
         [below - counted, above - counted]
     ]
     return float(low + (place - below) * (high - low))
+
+
+def _weighted_p95(values: Array, shares: Array) -> float:
+    """Interpolate between values, each of which lies amid its share."""
+    top = np.flatnonzero(values >= np.partition(values, 3 * values.size // 4)[3 * values.size // 4])
+    if shares[top].sum() < 2.0 * (1.0 - P95):
+        top = np.arange(values.size)
+    order = top[np.argsort(values[top])]
+    place = 1.0 - np.cumsum(shares[order][::-1])[::-1] + shares[order] / 2.0
+    return float(np.interp(P95, place, values[order]))
 
 
 # Measured machines: errors against tolerances, and the predicted volumetric error.

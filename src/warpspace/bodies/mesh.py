@@ -19,9 +19,12 @@ from warpspace.units import Array
 
 _STL_HEAD = 84
 _STL_ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+_UNKNOWN_COUNTS = 0, 2**32 - 1  # of writers that do not return to the header
 _MIXERS = 0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9  # odd numbers of 64 bits
 _GROUPS = re.compile(r"^[ \t]*(?:usemtl|mtllib|[ogs])\b[^\n]*", re.MULTILINE)
 _NEXT_SOLID = re.compile(rb"(?mi)^[ \t]*+endsolid[^\n]*+\n\s*+solid[^\n]*+")
+_DECIMAL_COMMA = re.compile(rb"(?<=\d),(?=\d)")
+_POINT = re.compile(rb"(?i)vertex[^\n]*\d\.\d")
 _FACE = re.compile("^f([^\n]*)", re.MULTILINE)
 _PLY_BYTES = {
     **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),
@@ -34,6 +37,41 @@ _DAE_REFERENCES = 20
 """Nodes of a DAE file by reference: each may hold others, so that they multiply."""
 NUMBERS_PER_TRIANGLE, WORDS_PER_TRIANGLE, BYTES_PER_TRIANGLE = 12, 40, 200
 """Limits per triangle of a file: numbers in lists or lines; words of a text, 21 in STL; bytes."""
+
+
+def repair_stl(data: bytes) -> tuple[bytes, list[str]]:
+    """Complete an STL file where its triangles are unambiguous, and report what was wrong."""
+    stored, spare = divmod(max(len(data) - _STL_HEAD, 0), _STL_ROW.itemsize)
+    stated = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little")
+    if _is_binary(data):
+        return data, []
+    text, notes = data.lower(), list[str]()
+    if b"vertex" not in text:
+        if stated == stored:
+            notes.append(f"{spare} bytes after its last triangle are ignored")
+        elif stated in _UNKNOWN_COUNTS and stored and not spare:
+            notes.append(f"its header states {stated:,} triangles; all {stored:,} stored are read")
+        else:
+            rest = f" and {spare} bytes" * bool(spare)
+            raise ValueError(
+                f"its header states {stated:,} triangles; {stored:,} triangles{rest} follow"
+            )
+        count, end = stored.to_bytes(4, "little"), _STL_HEAD + stored * _STL_ROW.itemsize
+        return data[: _STL_HEAD - 4] + count + data[_STL_HEAD:end], notes
+    comma, last = _DECIMAL_COMMA.search(data, text.find(b"vertex")), text.rfind(b"endfacet")
+    if comma:
+        line = 1 + data.count(b"\n", 0, comma.start())
+        if _POINT.search(data):
+            raise ValueError(f"line {line}: decimal commas and decimal points in one file")
+        data = _DECIMAL_COMMA.sub(b".", data)
+        notes.append(f"line {line}: decimal commas are read as decimal points")
+    if text.rfind(b"endsolid") < last:
+        if text[last + len(b"endfacet") :].strip():
+            count = data.rstrip().count(b"\n") + 1
+            raise ValueError(f"line {count}: the file ends within a facet; expected endfacet")
+        data += b"\nendsolid\n"
+        notes.append("endsolid is missing at its end; all its facets are read")
+    return data, notes
 
 
 def count_mesh(data: bytes, ending: str, max_triangles: int = limits.MAX_TRIANGLES) -> bytes:
@@ -61,9 +99,6 @@ def _count_stl(data: bytes, max_triangles: int) -> None:
     text = data.lower()
     _check_count(text.count(b"endsolid"), limits.MAX_SOLIDS, "solids")
     _check_count(text.count(b"vertex") // 3, max_triangles, "triangles")
-    if b"vertex" not in text:
-        n_stored = max(len(data) - _STL_HEAD, 0) // _STL_ROW.itemsize
-        raise ValueError(f"its head says {stated:,} triangles, {n_stored:,} follow")
 
 
 def _is_binary(data: bytes) -> bool:
@@ -264,7 +299,9 @@ def open_meshes(
     logging.getLogger("trimesh").addHandler(logging.NullHandler())
     try:
         with np.errstate(all="ignore"):
-            ending = path.suffix.lower()
+            ending, notes = path.suffix.lower(), list[str]()
+            if ending == ".stl":
+                data, notes = repair_stl(data)
             data = count_mesh(data, ending, max_triangles)
             merged = _merge_stl(data) if ending == ".stl" and _is_binary(data) else None
             file = io.BytesIO(data)
@@ -272,6 +309,7 @@ def open_meshes(
                 file, file_type=ending[1:], process=False, skip_materials=not has_materials
             )
             _check_geometry(scene, max_triangles)
+            scene.metadata["notes"] = [f"{path}: {note}" for note in notes]
             return scene
     except OptionError as error:
         raise OptionError(f"{path}: {error}. Reduce it before") from None

@@ -50,7 +50,7 @@ def read_mesh(
     if unit not in UNITS_MM:
         raise OptionError(f"{path}: {unit!r}; expected one of {', '.join(UNITS_MM)}")
     scene = open_meshes(path, f"{path.suffix[1:].upper()} file", max_triangles, data)
-    nodes = scene.graph.nodes_geometry
+    nodes, notes = scene.graph.nodes_geometry, scene.metadata["notes"]
     pose, name = scene.graph[nodes[0]] if len(nodes) == 1 else (None, None)
     is_one = hasattr(scene.geometry.get(name), "faces")  # a large one is not copied
     mesh = scene.geometry[name].apply_transform(pose) if is_one else scene.to_mesh()
@@ -76,16 +76,16 @@ def read_mesh(
     if not (is_closed or _is_closed(mesh.faces)):
         warning = f"{path}: the surface is not closed, or its triangles do not agree on the outside"
         count = len(grouping.group_rows(mesh.edges_sorted, require_count=1))
-        return mesh, (f"{warning} ({count:,} open edges); used as is",)
+        return mesh, (*notes, f"{warning} ({count:,} open edges); used as is")
     x, y, z = np.ascontiguousarray((mesh.vertices - mesh.vertices[0]).T)
     a, b, c = mesh.faces.T
     across = (y[b] - y[a]) * (z[c] - z[a]) - (z[b] - z[a]) * (y[c] - y[a])
     across *= x[a] + x[b] + x[c]  # six times the volume
     if across.sum() < 0.0:
         mesh.invert()
-        return mesh, (f"{path}: its triangles faced inwards and were inverted",)
+        return mesh, (*notes, f"{path}: its triangles faced inwards and were inverted")
     if len(mesh.faces) > MAX_FEATURE_TRIANGLES:
-        return mesh, ()
+        return mesh, (*notes,)
     shell = graph.connected_component_labels(mesh.edges, node_count=len(x))
     volume, low, high = np.bincount(shell[a], across), *np.full((2, shell.max() + 1, 3), np.inf)
     np.minimum.at(low, shell, mesh.vertices)
@@ -99,10 +99,10 @@ def read_mesh(
         if not len(cavities) or n_pairs > MAX_SHELL_PAIRS:
             break
     if len(cavities) and n_pairs > MAX_SHELL_PAIRS:
-        return mesh, (f"{path}: not checked whether shells face inwards (too many shells)",)
+        return mesh, (*notes, f"{path}: not checked whether shells face inwards (too many shells)")
     if len(cavities):
-        return mesh, (f"{path}: some of its shells face inwards; used as is",)
-    return mesh, ()
+        return mesh, (*notes, f"{path}: some of its shells face inwards; used as is")
+    return mesh, (*notes,)
 
 
 def _is_closed(faces: NDArray[np.int64]) -> bool:

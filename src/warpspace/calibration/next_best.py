@@ -307,21 +307,21 @@ def u95_at(
 def _u95_of_part(
     scene: Scene, parameters: solve.FitParameters, target: str
 ) -> Callable[[Array], float]:
-    from warpspace.parts import inspection, workpiece
+    from warpspace.parts import inspection, refinement, workpiece
 
     file = scene.part.path("file")
     if file is None:
         raise OptionError(f"{{target}} {target}: expected a scene whose [part] has a file")
     mesh = workpiece.load_workpiece(file, scene.part.unit or None)
+    mesh, _ = refinement.refine(mesh, scene)
     points = workpiece.evaluate_points(scene, workpiece.place_workpiece(mesh, scene).vertices_mm)
     gains = workpiece.point_basis(
         replace(scene, errors=parameters.errors), points, parameters.keys
     ).position
-    features, count = scene.part.path("features"), len(points.point_mm)
+    features = scene.part.path("features")
     if target == "part":
-        gains = workpiece.subtract_best_fit(points.point_mm, gains).reshape(
-            len(parameters.keys), -1
-        ) / np.sqrt(count)
+        gains = workpiece.subtract_best_fit(points.point_mm, gains, mesh.shares)
+        gains = (gains * np.sqrt(mesh.shares)[:, None]).reshape(len(parameters.keys), -1)
         return lambda covariance: FACTOR * float(np.sqrt(np.sum(gains * (covariance @ gains))))
     if features is not None:
         tolerances = features, read_text(Path(features), MAX_SCENE_BYTES)

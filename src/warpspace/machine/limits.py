@@ -55,6 +55,7 @@ MAX_REPLIES = 200  # of one note, and versions of it
 MAX_REPLACED = 1000  # earlier versions that an edit of a note names
 
 MAX_TOLERANCES = 1000  # of the features of a part
+MAX_REFINED_VERTICES = 30_000  # added to a mesh for its evaluation, or a fourth of it
 MAX_FEATURE_TRIANGLES = 300_000  # of a mesh in which features are recognised: a second or two
 
 # --- meshes and robots: counted before anything is built ------------------------------------------

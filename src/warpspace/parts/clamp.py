@@ -20,7 +20,7 @@ from warpspace.bench.placing import following_axes
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.kinematics.relative_motion import relative_point
-from warpspace.machine.limits import MAX_FEATURE_TRIANGLES
+from warpspace.parts.refinement import refine, sample_vertices
 from warpspace.parts.workpiece import (
     Workpiece,
     WorkpieceAnalysis,
@@ -30,9 +30,10 @@ from warpspace.parts.workpiece import (
     subtract_best_fit,
 )
 from warpspace.scene.model import Scene, second_order
+from warpspace.units import Array
 
-SEARCH_VERTICES = 800  # of the search; the best places are evaluated with all vertices
-FINALISTS = 3  # best places of the search, evaluated with all vertices
+MAX_EVALUATED_VERTICES = 4000  # at each place; of larger meshes a sample and the outermost ones
+OUTERMOST = 200  # directions
 TILTS = (0, 0), (90, 0), (180, 0), (270, 0), (0, 90), (0, 270)  # degrees about x and y
 MAX_ROWS, CLASSES = 10, 5  # places of the table; colours of the map
 
@@ -44,7 +45,7 @@ class Clamping:
     place: tuple[float, ...]  # [6], mm and degrees, in the workpiece frame
     max_um: float
     placed_um: float  # after the best rigid fit
-    outside: int  # vertices beyond the travel
+    outside: int  # evaluated points beyond the travel
     expanded_uncertainty: ExpandedUncertainty[float | None] = field(
         default_factory=ExpandedUncertainty[float | None]
     )
@@ -92,13 +93,16 @@ class Clamp(WorkpieceAnalysis):
             z = float(np.clip(level - turned[:, 2].min(), low[2], high[2]))
             grid = np.linspace(low[:2], high[:2], self.grid).T.tolist()
             places += [(x, y, z, *turn) for x, y in product(*grid)]
-        vertices = mesh.vertices_mm
-        outermost = np.random.default_rng(0).standard_normal((3, SEARCH_VERTICES // 4))
-        regular = range(0, len(vertices), -(-len(vertices) // SEARCH_VERTICES))
-        rows = [*np.argmax(vertices @ outermost, axis=0), *regular]
-        sample, clampings = replace(mesh, vertices_mm=vertices[rows]), list[Clamping]()
+        fine, _ = refine(mesh, scene, part.place)
+        points, shares = sample_vertices(fine, MAX_EVALUATED_VERTICES)
+        if len(points) < len(fine.vertices_mm):
+            directions = np.random.default_rng(0).standard_normal((OUTERMOST, 3))
+            rows = [np.argmax(mesh.vertices_mm @ direction) for direction in directions]
+            points = np.concatenate([points, mesh.vertices_mm[rows]])
+            shares = np.concatenate([shares, np.zeros(OUTERMOST)])
+        sample, clampings = replace(mesh, vertices_mm=points), list[Clamping]()
         for number, place in enumerate(places):
-            clamping = _evaluate(scene, place_workpiece(sample, scene, place))
+            clamping = _evaluate(scene, place_workpiece(sample, scene, place), shares)
             if not clamping.outside:
                 clampings.append(clamping)
             watch((number + 1) / len(places))
@@ -106,36 +110,34 @@ class Clamp(WorkpieceAnalysis):
         clampings.sort(key=criterion)
         if not clampings:
             raise OptionError(f"{mesh.name} fits nowhere into the travel of {scene.machine.chain}")
-        now, *best = (
-            _evaluate(scene, place_workpiece(mesh, scene, place))
-            for place in (part.place, *(clamping.place for clamping in clampings[:FINALISTS]))
-        )
-        first = min(now, *best, key=lambda clamping: (clamping.outside > 0, criterion(clamping)))
+        now = _evaluate(scene, place_workpiece(sample, scene, part.place), shares)
+        first = min(now, clampings[0], key=lambda at: (at.outside > 0, criterion(at)))
         result = ClampResult(
             places=clampings, best=first, present=now, gain_um=criterion(now) - criterion(first),
             title=f"{scene.title} · {mesh.name}", placed=self.placed, warnings=mesh.warnings,
             second_order=second_order(scene, Loop.RELATIVE),
         )  # fmt: skip
-        if len(mesh.triangles) > MAX_FEATURE_TRIANGLES:
-            return result
-        each = [_uncertainties(scene, mesh, clamping.place) for clamping in (now, first)]
+        each = [_uncertainties(scene, sample, shares, clamping.place) for clamping in (now, first)]
         return result.with_expanded_uncertainty(*each) if all(each) else result
 
 
-def _evaluate(scene: Scene, part: Workpiece) -> Clamping:
+def _evaluate(scene: Scene, part: Workpiece, shares: Array) -> Clamping:
     actual = evaluate_points(scene, part.vertices_mm)
-    errors = actual.error_um, subtract_best_fit(actual.point_mm, actual.error_um)
+    errors = actual.error_um, subtract_best_fit(actual.point_mm, actual.error_um, shares)
     clamped, placed = (float(np.linalg.norm(error, axis=1).max()) for error in errors)
     return Clamping(part.place, clamped, placed, int(actual.outside.sum()))
 
 
-def _uncertainties(scene: Scene, mesh: Workpiece, place: Sequence[float]) -> list[FieldUncertainty]:
+def _uncertainties(
+    scene: Scene, sample: Workpiece, shares: Array, place: Sequence[float]
+) -> list[FieldUncertainty]:
     """Return the uncertainty as clamped, and after the best rigid fit."""
-    actual = evaluate_points(scene, place_workpiece(mesh, scene, place).vertices_mm)
-    clamped = point_uncertainty(scene, actual)
+    actual = evaluate_points(scene, place_workpiece(sample, scene, place).vertices_mm)
+    clamped = point_uncertainty(scene, actual, shares)
     if clamped is None:
         return []
-    return [clamped, clamped.transform(partial(subtract_best_fit, actual.point_mm))]
+    fit = partial(subtract_best_fit, actual.point_mm, shares=shares)
+    return [clamped, clamped.transform(fit)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,7 +145,7 @@ class ClampResult(Result):
     """Fixture positions of a part, the best one, and its gain."""
 
     json_keys = ("places", "best", "present", "gain_um", "expanded_uncertainty")
-    places: list[Clamping]  # from some of the vertices, best first
+    places: list[Clamping]  # best first
     best: Clamping
     present: Clamping
     gain_um: float
@@ -206,4 +208,4 @@ class ClampResult(Result):
     def caveats(self) -> Iterator[str]:
         yield from (*self.warnings, *super().caveats())
         if self.present.outside:
-            yield f"at present {self.present.outside:,} vertices are beyond the travel"
+            yield f"at present {self.present.outside:,} evaluated points are beyond the travel"

@@ -3,10 +3,11 @@
 A shape is a surface of revolution about an axis: a point at the height h along it and the distance
 ρ from it has the distance (ρ − radius) · cos φ − h · sin φ to the surface. φ is 0 for a
 cylinder and the half angle of a cone; −90° makes it a plane whose axis is its normal; without an
-axis it is a sphere. Shapes are fitted to vertices by least squares of these distances, and follow
-their small displacements in first order. A measure is evaluated on the workpiece as clamped, and
-`placed`, after the best rigid fit of all vertices. The contribution of a parameter is evaluated
-where all errors are half as large, so that contributions add up.
+axis it is a sphere. Shapes are fitted to vertices by least squares of these distances, weighted by
+the area of their triangles, and follow their small displacements in first order. A measure is
+evaluated on the workpiece as clamped, and `placed`, after the best rigid fit of its surface. The
+contribution of a parameter is evaluated where all errors are half as large, so that contributions
+add up.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -28,7 +29,13 @@ from warpspace.analysis.uncertainty.verdict import Verdict
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.kinematics.model import Loop
 from warpspace.kinematics.transforms import skew, vector_rotation
-from warpspace.parts.workpiece import ActualPoints, Workpiece, point_basis, subtract_best_fit
+from warpspace.parts.workpiece import (
+    ActualPoints,
+    Workpiece,
+    measure_triangles,
+    point_basis,
+    subtract_best_fit,
+)
 from warpspace.scene import schema
 from warpspace.scene.model import Scene, evaluate
 from warpspace.scene.text_files import parse_toml
@@ -103,28 +110,29 @@ class Feature:
     """One surface of a workpiece."""
 
     shape: FeatureShape  # in the frame of the mesh
-    vertices: NDArray[np.int32]  # [n], of the mesh
+    vertices: NDArray[np.int32]  # [n], of the refined mesh
+    shares: Array  # [n], of its area
     area_mm2: float
     normal: Array  # [n, 3]; see `FeatureShape.respond`
     design: Array  # [n, 8]
 
     def follow(self, move_um: Array) -> ShapeMotion:
         """Fit the motion of the shape to displacements of all vertices of the mesh, [F, V, 3]."""
-        move = move_um[:, self.vertices] * MM_PER_UM
-        mean = move.mean(axis=1)  # directions without influence on distances follow it
+        move, root = move_um[:, self.vertices] * MM_PER_UM, np.sqrt(self.shares)[:, None]
+        mean = self.shares @ move  # directions without influence on distances follow it
         away = np.einsum("fnc,nc->fn", move - mean[:, None], self.normal)
-        step = -np.linalg.lstsq(self.design, away.T, RANK_TOLERANCE)[0].T
+        step = -np.linalg.lstsq(self.design * root, away.T * root, RANK_TOLERANCE)[0].T
         radius, angle = self.shape.radius_mm + step[:, 6], self.shape.angle_rad + step[:, 7]
         form = np.ptp(away + step @ self.design.T, axis=1)
         return ShapeMotion(self.shape, mean + step[:, :3], step[:, 3:6], radius, angle, form)
 
 
-def fit_shape(start: FeatureShape, point_mm: Array) -> FeatureShape:
+def fit_shape(start: FeatureShape, point_mm: Array, shares: Array | None = None) -> FeatureShape:
     """Fit a shape to points, [n, 3], by least squares of distances, from an approximate one."""
-    shape = start
+    shape, root = start, np.sqrt(np.ones(len(point_mm)) if shares is None else shares)
     for _ in range(STEPS):
         distance, _, design = shape.respond(point_mm)
-        step = -np.linalg.lstsq(design, distance, RANK_TOLERANCE)[0]
+        step = -np.linalg.lstsq(design * root[:, None], distance * root, RANK_TOLERANCE)[0]
         centre, axis = shape.centre_mm + step[:3], vector_rotation(step[3:6]) @ shape.axis
         radius, angle = shape.radius_mm + step[6], shape.angle_rad + step[7]
         shape = FeatureShape(shape.kind, centre, axis, radius, angle)
@@ -133,15 +141,16 @@ def fit_shape(start: FeatureShape, point_mm: Array) -> FeatureShape:
     return shape
 
 
-def find_features(mesh: Workpiece) -> dict[str, Feature]:
+def find_features(fine: Workpiece) -> dict[str, Feature]:
     """Find the shapes that the surface of a part consists of, sorted by kind, size and place.
 
-    Surfaces between creases are examined first, then the remaining ones, divided by the size of
-    their facets. A surface that deviates from all shapes by more than `SHAPE_SHARE` of its extent
-    is no feature.
+    Those of the original mesh, with the vertices of the refined one. Surfaces between creases are
+    examined first, then the remaining ones, divided by the size of their facets. A surface that
+    deviates from all shapes by more than `SHAPE_SHARE` of its extent is no feature.
     """
     from trimesh.graph import connected_component_labels, connected_components
 
+    mesh = fine.original or fine
     area, pairs = mesh.surface.area_faces, mesh.surface.face_adjacency
     angle = mesh.surface.face_adjacency_angles
     facet_of = connected_component_labels(pairs[angle < FLAT_RAD], len(area))
@@ -155,7 +164,7 @@ def find_features(mesh: Workpiece) -> dict[str, Feature]:
         surfaces: Any = connected_components(links, min_len=2, engine="scipy")
         for rows in sorted(surfaces, key=lambda rows: -area[rows].sum())[:MAX_FEATURES]:
             kinds = SHAPES if len(np.unique(facet_of[rows])) >= FACETS else SHAPES[:1]
-            fits = (_fit_feature(mesh, kind, rows) for kind in kinds)
+            fits = (_fit_feature(fine, mesh, kind, rows) for kind in kinds)
             feature = next(filter(None, fits), None)
             if feature is not None:
                 is_free[rows] = False
@@ -168,7 +177,9 @@ def find_features(mesh: Workpiece) -> dict[str, Feature]:
     return names
 
 
-def _fit_feature(mesh: Workpiece, kind: str, rows: NDArray[np.intp]) -> Feature | None:
+def _fit_feature(
+    fine: Workpiece, mesh: Workpiece, kind: str, rows: NDArray[np.intp]
+) -> Feature | None:
     """Fit a shape to triangles; None where their normals or vertices deviate from it."""
     normal, area = mesh.surface.face_normals[rows], mesh.surface.area_faces[rows]
     place, weight = mesh.surface.triangles_center[rows], area / area.sum()
@@ -189,14 +200,29 @@ def _fit_feature(mesh: Workpiece, kind: str, rows: NDArray[np.intp]) -> Feature 
     is_turned = turned * np.sign(area @ turned) < np.cos(np.deg2rad(NEAR_DEG))
     if area @ is_turned > SLIVER_SHARE * area.sum():
         return None
-    vertices = np.unique(mesh.triangles[rows])
+    vertices, shares = _weigh_vertices(mesh, rows)
     points = mesh.vertices_mm[vertices]
-    shape = fit_shape(start, points)
-    distance, *response = shape.respond(points)
+    shape = fit_shape(start, points, shares)
+    distance, *_ = shape.respond(points)
     tolerance = SHAPE_SHARE * np.linalg.norm(np.ptp(points, axis=0))
     tolerance += ROUNDING_SHARE * np.abs(mesh.vertices_mm).max()
-    is_close = np.abs(distance).max() <= tolerance
-    return Feature(shape, vertices, float(area.sum()), *response) if is_close else None
+    if np.abs(distance).max() > tolerance:
+        return None
+    if fine.source is not None:
+        is_part = np.zeros(len(mesh.triangles), dtype=bool)
+        is_part[rows] = True
+        vertices, shares = _weigh_vertices(fine, np.flatnonzero(is_part[fine.source]))
+    _, *response = shape.respond(fine.vertices_mm[vertices])
+    return Feature(shape, vertices, shares, float(area.sum()), *response)
+
+
+def _weigh_vertices(mesh: Workpiece, rows: NDArray[np.intp]) -> tuple[NDArray[np.int32], Array]:
+    """Return the vertices of triangles and their shares of the area."""
+    corners = mesh.triangles[rows]
+    vertices, index = np.unique(corners, return_inverse=True)
+    area = np.repeat(measure_triangles(mesh.vertices_mm, corners)[0], 3)
+    shares = np.bincount(index.reshape(-1), area)
+    return vertices, shares / shares.sum()
 
 
 def _distance(feature: ShapeMotion, datum: ShapeMotion) -> Array:
@@ -289,8 +315,8 @@ def inspect(
     """Measure the features of a workpiece, in the frame of its mesh.
 
     A verdict is undecided where the distance to the tolerance is below `interpolation_um`, the
-    largest deviation of errors between vertices. `tolerances` are the name and the text of a TOML
-    file of features; a SceneError lists its problems.
+    largest deviation of errors between evaluated points. `tolerances` are the name and the text of
+    a TOML file of features; a SceneError lists its problems.
     """
     by_name, points = find_features(mesh), mesh.vertices_mm
     names, features = [*by_name], by_name.values()
@@ -306,24 +332,25 @@ def inspect(
     if not bands:
         return ()
     turn, evaluate_measures = _rotation(mesh, actual), partial(_evaluate_measures, features, bands)
+    fit = partial(subtract_best_fit, points, shares=mesh.shares)
     errors = [actual.error_um]
     if any(bands.values()):
         at = actual.coordinates
         exact = evaluate(scene, at=at, loop=Loop.RELATIVE, frame="workpiece", exact=True)
         errors.append(exact.error_um)
-    placed = subtract_best_fit(points, np.array(errors) @ turn)
+    placed = fit(np.array(errors) @ turn)
     values = evaluate_measures(np.stack([0.0 * placed[0], actual.error_um @ turn, *placed]))
     budget: dict[str, Array] = {}
     for key in scene.parameter_keys:
         amplitude = scene.errors.amplitude(key)
         if amplitude:
             effect = amplitude * point_basis(scene, actual, [key]).position @ turn
-            effect = STEP_SHARE * subtract_best_fit(points, effect)
+            effect = STEP_SHARE * fit(effect)
             low, high = evaluate_measures(placed[0] / 2.0 + np.concatenate([-effect, effect]))
             budget[key] = (high - low) / (2.0 * STEP_SHARE)
     u95: list[float | None] = [None] * len(bands)
     if uncertainty is not None:
-        changes = subtract_best_fit(points, uncertainty.response @ turn)
+        changes = fit(uncertainty.response @ turn)
         u95 = uncertainty.errors.propagate(
             lambda change: evaluate_measures(placed[:1] + np.tensordot(change, changes, 1))[0]
         )
@@ -354,7 +381,7 @@ def measure_changes(
     bands = _read_tolerances(*tolerances, shapes, [*features])
     toleranced = [measure for measure, band in bands.items() if band]
     moved = np.array([actual.error_um, *moves_um]) @ _rotation(mesh, actual)
-    present, *steps = subtract_best_fit(mesh.vertices_mm, moved)
+    present, *steps = subtract_best_fit(mesh.vertices_mm, moved, mesh.shares)
     moves = (present + sign * STEP_SHARE * np.array(steps) for sign in (-1.0, 1.0))
     low, high = (_evaluate_measures(features.values(), toleranced, move) for move in moves)
     return (high - low) / (2.0 * STEP_SHARE)

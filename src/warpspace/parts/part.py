@@ -23,7 +23,9 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_SCENE_BYTES
 from warpspace.parts.inspection import FeatureResult, features_table, inspect
+from warpspace.parts.refinement import refine
 from warpspace.parts.workpiece import (
+    TRIANGLES_AT_ONCE,
     ActualPoints,
     Workpiece,
     WorkpieceAnalysis,
@@ -36,13 +38,12 @@ from warpspace.scene.model import Scene, second_order
 from warpspace.scene.text_files import read_text
 from warpspace.units import MM_PER_UM, Array
 
-CHECKED_EDGES, REPORTED_UM = 500, 0.5  # longest edges; interpolation errors that are reported
-TRIANGLES_AT_ONCE = 200_000  # limits the memory of intermediate arrays
+REPORTED_UM = 0.5  # interpolation errors that are reported
 
 
 @dataclass(frozen=True, kw_only=True)
 class PartDeviation:
-    """Deviation of the vertices of a workpiece from nominal."""
+    """Deviation of the surface of a workpiece from nominal."""
 
     deviation: Statistics
     normal: Numbers  # min_um and max_um along normals of triangles, at their corners, and U95
@@ -54,7 +55,7 @@ class Part(WorkpieceAnalysis):
 
     Rotary axes are at their positions of the scene; linear axes bring the tool to each vertex of
     the clamped part. Errors are those of the tool against the workpiece, in the workpiece frame,
-    actual − nominal: as cut, and placed, after the best rigid fit of all vertices, as in an
+    actual − nominal: as cut, and placed, after the best rigid fit of its surface, as in an
     inspection. Planes, cylinders, cones and spheres are recognised and measured.
     Geometry only: no forces, heat, wear or servo.
     """
@@ -80,30 +81,30 @@ class Part(WorkpieceAnalysis):
         if features and not tolerances:
             tolerances = features, read_text(Path(features), MAX_SCENE_BYTES)
         watch(0.2)
-        workpiece = place_workpiece(mesh, scene, self.place)
-        actual = evaluate_points(scene, workpiece.vertices_mm)
+        fine, interpolation = refine(mesh, scene, self.place)
+        surface = place_workpiece(fine, scene, self.place)
+        actual, vertices = evaluate_points(scene, surface.vertices_mm), len(mesh.vertices_mm)
         watch(0.5)
-        is_large = len(mesh.triangles) > MAX_FEATURE_TRIANGLES
-        interpolation = 0.0 if is_large else _interpolation_error(scene, workpiece, actual)
         if interpolation <= REPORTED_UM:
             interpolation = 0.0
-        uncertainty = None if is_large else point_uncertainty(scene, actual)
-        fit = partial(subtract_best_fit, actual.point_mm)
+        is_large = len(mesh.triangles) > MAX_FEATURE_TRIANGLES
+        uncertainty = None if is_large else point_uncertainty(scene, actual, fine.shares)
+        fit = partial(subtract_best_fit, actual.point_mm, shares=fine.shares)
         placed_uncertainty = uncertainty.transform(fit) if uncertainty else None
-        as_cut = _deviation(workpiece, actual, actual.error_um, uncertainty)
-        placed = _deviation(workpiece, actual, fit(actual.error_um), placed_uncertainty)
+        states = (actual.error_um, uncertainty), (fit(actual.error_um), placed_uncertainty)
+        as_cut, placed = _deviations(surface, fine.shares, actual, states)
         features_of: Sequence[FeatureResult] = ()
         if not is_large:
-            features_of = inspect(scene, mesh, actual, tolerances, uncertainty, interpolation)
+            features_of = inspect(scene, fine, actual, tolerances, uncertainty, interpolation)
         return PartResult(
-            vertices=len(mesh.vertices_mm),
-            outside=int(actual.outside.sum()),
+            vertices=vertices,
+            outside=int(actual.outside[:vertices].sum()),
             **vars(as_cut),
             placed=placed,
             features=features_of,
             uncertainty=uncertainty and uncertainty.errors,
             interpolation_um=interpolation,
-            workpiece=workpiece,
+            workpiece=place_workpiece(mesh, scene, self.place),
             actual=actual,
             scene=scene,
             analysis=self,
@@ -111,38 +112,42 @@ class Part(WorkpieceAnalysis):
         )
 
 
-def _interpolation_error(scene: Scene, part: Workpiece, actual: ActualPoints) -> float:
-    """Compute the largest deviation of errors amid the longest edges from the mean of ends, µm."""
-    corner = np.take(part.vertices_mm, part.triangles, axis=0)
-    length = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).reshape(-1)
-    longest = np.argsort(-length)[:CHECKED_EDGES]
-    edges = np.stack([part.triangles, np.roll(part.triangles, -1, axis=1)], -1).reshape(-1, 2)
-    ends = edges[longest]
-    middle_um = evaluate_points(scene, part.vertices_mm[ends].mean(axis=1)).error_um
-    deviation_um = middle_um - actual.error_um[ends].mean(axis=1)
-    return float(np.linalg.norm(deviation_um, axis=1).max())
-
-
-def _deviation(
-    part: Workpiece, actual: ActualPoints, error_um: Array, uncertainty: FieldUncertainty | None
-) -> PartDeviation:
+def _deviations(
+    part: Workpiece,
+    shares: Array,
+    actual: ActualPoints,
+    states: Sequence[tuple[Array, FieldUncertainty | None]],
+) -> list[PartDeviation]:
+    """Summarise errors and their components along the normals of triangles."""
     from trimesh import triangles
 
     # lowest and highest so far: deviation, vertex, normal
-    span = [(end, 0, np.zeros(3)) for end in (np.inf, -np.inf)]
+    spans = [[(end, 0, np.zeros(3)) for end in (np.inf, -np.inf)] for _ in states]
     for first in range(0, len(part.triangles), TRIANGLES_AT_ONCE):
         rows = part.triangles[first : first + TRIANGLES_AT_ONCE]
         normals, is_valid = triangles.normals(np.take(part.vertices_mm, rows, axis=0))
         corners = rows[is_valid]
-        along = np.einsum("tcx,tx->tc", np.take(error_um, corners, axis=0), normals)
-        if not along.size:
-            continue
-        for index, (choose, better) in enumerate(((np.argmin, min), (np.argmax, max))):
-            at = int(choose(along))
-            candidate = along.item(at), corners.item(at), normals[at // 3]
-            span[index] = better(span[index], candidate, key=itemgetter(0))
+        for (error_um, _), span in zip(states, spans, strict=True):
+            along = np.einsum("tcx,tx->tc", np.take(error_um, corners, axis=0), normals)
+            if not along.size:
+                continue
+            for index, (choose, better) in enumerate(((np.argmin, min), (np.argmax, max))):
+                at = int(choose(along))
+                candidate = along.item(at), corners.item(at), normals[at // 3]
+                span[index] = better(span[index], candidate, key=itemgetter(0))
+    deviations = zip(states, spans, strict=True)
+    return [_summarise(actual, shares, *state, span) for state, span in deviations]
+
+
+def _summarise(
+    actual: ActualPoints,
+    shares: Array,
+    error_um: Array,
+    uncertainty: FieldUncertainty | None,
+    span: Sequence[tuple[float, int, Array]],
+) -> PartDeviation:
     field = ErrorField(actual.point_mm, error_um, np.broadcast_to(np.nan, error_um.shape))
-    deviation = statistics(field, actual.coordinates)
+    deviation = statistics(field, actual.coordinates, shares)
     if uncertainty is not None:
         deviation = uncertainty.with_expanded_uncertainty(deviation)
     normal: dict[str, float | None] = {}
@@ -163,7 +168,7 @@ class PartResult(PartDeviation, Result):
     placed: PartDeviation
     features: Sequence[FeatureResult]
     workpiece: Workpiece  # nominal, in the workpiece frame
-    actual: ActualPoints  # its vertices
+    actual: ActualPoints  # its vertices, and those that refine it
     scene: Scene
     analysis: Part
     interpolation_um: float  # largest interpolation error; 0 below REPORTED_UM
@@ -175,12 +180,12 @@ class PartResult(PartDeviation, Result):
             yield f"{far} are beyond the travel; their errors are continued"
         if self.interpolation_um:
             excess = f"up to {self.interpolation_um:.1f} µm"
-            yield f"errors between vertices deviate by {excess} more; expected a finer mesh"
+            yield f"errors between evaluated points deviate by {excess} more; expected a finer mesh"
         count = len(self.workpiece.triangles)
         if count > MAX_FEATURE_TRIANGLES:
             yield (
-                f"{count:,} triangles; features, U95 and errors between vertices are evaluated for"
-                f" up to {MAX_FEATURE_TRIANGLES:,}"
+                f"{count:,} triangles; features and U95 are evaluated for up to"
+                f" {MAX_FEATURE_TRIANGLES:,}"
             )
 
     def blocks(self) -> Iterator[Block]:
@@ -207,7 +212,8 @@ class PartResult(PartDeviation, Result):
 
     def output_files(self, ending: str = ".stl", /) -> Mapping[str, bytes | str]:
         """Write the part in the frame and unit of its mesh: actual, or predistorted."""
-        nominal, moved = self.actual.point_mm, self.actual.error_um * MM_PER_UM
+        nominal = self.workpiece.vertices_mm
+        moved = self.actual.error_um[: self.vertices] * MM_PER_UM
         for _ in range(2 * self.analysis.predistorted):
             moved = -evaluate_points(self.scene, nominal + moved).error_um * MM_PER_UM
         place, (unit, up) = self.workpiece.place, FORMATS[ending]

@@ -31,7 +31,8 @@ from warpspace.scene.model import Scene, evaluate
 from warpspace.scene.text_files import parse_number
 from warpspace.units import Array, Integers
 
-POINTS_AT_ONCE, PAIRS_AT_ONCE = 50_000, 500_000  # limits the memory of intermediate arrays
+# limits of the memory of intermediate arrays
+POINTS_AT_ONCE, PAIRS_AT_ONCE, TRIANGLES_AT_ONCE = 50_000, 500_000, 200_000
 TOUCH_SHARE = 1e-5  # share of the largest coordinate up to which triangles only touch
 GROUP_SIZE, MAX_PAIRS = 100, 2e8  # triangles of a group that is not split; pairs examined
 
@@ -55,6 +56,26 @@ class Workpiece:
     unit: str | None = None  # of the numbers in its file; None for that of the format
     warnings: tuple[str, ...] = ()  # open, inverted or self-intersecting surface
     place: tuple[float, ...] = (0.0,) * 6  # where it is clamped, mm and degrees
+    original: "Workpiece | None" = None  # of a refined mesh, in its own frame
+    source: NDArray[np.intp] | None = None  # [T], triangles of the original
+
+    @cached_property
+    def sizes(self) -> tuple[Array, Array]:
+        """Areas of triangles, mm², and their longest edges squared, [T]."""
+        parts = range(0, len(self.triangles), TRIANGLES_AT_ONCE)
+        rows = (self.triangles[first : first + TRIANGLES_AT_ONCE] for first in parts)
+        area, square = zip(
+            *(measure_triangles(self.vertices_mm, part) for part in rows), strict=True
+        )
+        return np.concatenate(area), np.concatenate(square)
+
+    @cached_property
+    def shares(self) -> Array:
+        """Share of each vertex in the surface area, [V]: a third of that of its triangles."""
+        area, share = self.sizes[0], np.zeros(len(self.vertices_mm))
+        for corner in self.triangles.T:
+            share += np.bincount(corner, area, len(share))
+        return share / share.sum()
 
     @cached_property
     def middle_mm(self) -> Array:
@@ -87,6 +108,16 @@ class Workpiece:
         triangles = label.reshape(-1, 3).astype(np.int32)
         creases = label[corner[is_sharp][..., 0]].astype(np.int32)
         return Corners(corner_of, triangles, split.vertex_normals, creases)
+
+
+def measure_triangles(vertices_mm: Array, triangles: NDArray[np.int32]) -> tuple[Array, Array]:
+    """Compute the areas of triangles, mm², and their longest edges squared, [T]."""
+    first, second, third = (np.take(vertices_mm, corner, axis=0) for corner in triangles.T)
+    edge, other = second - first, third - second
+    pairs = (edge, edge), (other, other), (edge, other)
+    a, b, product = (np.einsum("tx,tx->t", *pair) for pair in pairs)
+    longest = np.maximum(np.maximum(a, b), a + b + 2.0 * product)
+    return np.sqrt(np.maximum(a * b - product * product, 0.0)) / 2.0, longest
 
 
 def load_workpiece(
@@ -252,7 +283,9 @@ def point_basis(
     return build_basis(scene.model, scene.errors, keys, at, view, point)
 
 
-def point_uncertainty(scene: Scene, made: ActualPoints) -> FieldUncertainty | None:
+def point_uncertainty(
+    scene: Scene, made: ActualPoints, shares: Array | None = None
+) -> FieldUncertainty | None:
     """Return the uncertainty of errors at points; None where the scene states none."""
     uncertainty = scene_uncertainty(scene, Loop.RELATIVE)
     if uncertainty is None:
@@ -260,16 +293,22 @@ def point_uncertainty(scene: Scene, made: ActualPoints) -> FieldUncertainty | No
     point = transforms.apply(branch_pose(scene.model, "workpiece", made.coordinates), made.point_mm)
     view = scene.view(Loop.RELATIVE, "workpiece")
     basis = uncertainty.respond(scene.model, made.coordinates, view, point)
-    return combine(uncertainty, basis.position, made.error_um)
+    return combine(uncertainty, basis.position, made.error_um, shares)
 
 
-def subtract_best_fit(point_mm: Array, error_um: Array) -> Array:
-    """Subtract from errors, [..., n, 3], µm, the best-fit rigid motion of points, [n, 3]."""
-    arm = point_mm - point_mm.mean(axis=0)
-    shift = error_um.mean(axis=-2, keepdims=True)
-    inertia = np.sum(arm * arm) * np.eye(3) - arm.T @ arm
+def subtract_best_fit(point_mm: Array, error_um: Array, shares: Array | None = None) -> Array:
+    """Subtract from errors, [..., n, 3], µm, the best-fit rigid motion of points, [n, 3].
+
+    `shares`, [n], are the weights of the points, their sum is 1; equal ones by default.
+    """
+    if shares is None:
+        shares = np.full(len(point_mm), 1.0 / len(point_mm))
+    arm = point_mm - shares @ point_mm
+    weighted = arm * shares[:, None]
+    shift = (shares @ error_um)[..., None, :]
+    inertia = np.sum(arm * weighted) * np.eye(3) - arm.T @ weighted
     # a cross product of each pair takes five times longer
-    product = np.swapaxes(error_um, -1, -2) @ arm
+    product = np.swapaxes(error_um, -1, -2) @ weighted
     moment = (product - np.swapaxes(product, -1, -2))[..., [2, 0, 1], [1, 2, 0]]
     # points on a line leave the rotation about it undetermined: the smallest one is taken
     turn = moment @ np.linalg.pinv(inertia, rcond=1e-12, hermitian=True)

@@ -421,7 +421,9 @@ def test_corners_that_share_a_key_are_left_to_trimesh(tmp_path, monkeypatch):
     assert (len(found.vertices), found.volume) == (8, pytest.approx(27_000.0))
 
 
-@pytest.mark.parametrize(("stated", "said"), [(7, "7 triangles, 5 follow"), (0, "no triangles")])
+@pytest.mark.parametrize(
+    ("stated", "said"), [(7, "7 triangles; 5 triangles follow"), (0, "no triangles")]
+)
 def test_a_binary_stl_of_other_length_than_it_says_is_refused(stated, said, tmp_path):
     rows = b"\0" * 50 * (5 if stated else 0)
     (tmp_path / "a.stl").write_bytes(b"\0" * 80 + stated.to_bytes(4, "little") + rows)
@@ -467,3 +469,50 @@ def test_shells_within_shells_are_examined_once_each():
     _, warnings = read_mesh(Path("a.stl"), "mm", data=data)
     assert time.process_time() - began < 8.0
     assert warnings == ()
+
+
+TEXT_STL = "solid x\n" + "".join(
+    "facet normal 0 0 0\nouter loop\n"
+    + "".join(f"vertex {x:.3f} {y:.3f} {z:.3f}\n" for x, y, z in triangle)
+    + "endloop\nendfacet\n"
+    for triangle in box(SIZE).triangles
+)
+BINARY_STL = box(SIZE).export(file_type="stl")
+COUNTED = BINARY_STL[:80] + b"%b" + BINARY_STL[84:]
+IMPERFECT = {
+    "commas": (
+        TEXT_STL.replace(".", ",") + "endsolid x\n",
+        "line 4: decimal commas are read as decimal points",
+    ),
+    "no end": (TEXT_STL, "endsolid is missing at its end; all its facets are read"),
+    "spare": (BINARY_STL + b"\r\n spare bytes", "14 bytes after its last triangle are ignored"),
+    "count": (COUNTED % bytes(4), "its header states 0 triangles; all 12 stored are read"),
+}
+
+
+@pytest.mark.parametrize("name", IMPERFECT)
+def test_an_imperfect_stl_is_read_with_a_message(name, tmp_path):
+    content, note = IMPERFECT[name]
+    path = tmp_path / "a.stl"
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    body = load_mesh(path, "R")
+    assert body.warnings == (f"{path}: {note}",)
+    assert np.ptp(body.vertices_mm, axis=0) == pytest.approx(SIZE)
+    assert len(body.triangles) == 12
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (TEXT_STL[:-20], "line 83: the file ends within a facet; expected endfacet"),
+        (TEXT_STL.replace(".", ",", 1) + "endsolid x\n", "line 4: decimal commas and decimal"),
+        (COUNTED % b"\7\0\0\0", "its header states 7 triangles; 12 triangles follow"),
+        (BINARY_STL + bytes(60), "its header states 12 triangles; 13 triangles and 10 bytes"),
+        (BINARY_STL[:-7], "its header states 12 triangles; 11 triangles and 43 bytes follow"),
+    ],
+)
+def test_an_ambiguous_stl_is_refused(content, message, tmp_path):
+    path = tmp_path / "a.stl"
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    with pytest.raises(OptionError, match=message):
+        load_mesh(path, "R")
