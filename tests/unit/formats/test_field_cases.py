@@ -1,11 +1,25 @@
 """Files as they are found in the shop, after public bug reports and manuals, with their numbers."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from warpspace.exceptions import SceneError
 from warpspace.formats.measured import BACKWARD, FORWARD
 from warpspace.formats.registry import ReadOptions, read_errors
 from warpspace.formats.source import source_of_text
+from warpspace.formats.to_scene import build_imported_scene
+from warpspace.kinematics.chain import loop_error, nominal_point
+from warpspace.kinematics.model import Loop
+from warpspace.machine.errors import ErrorSet
+from warpspace.scene.library import load_scene, parse_scene
+
+
+def imported_scene(text, name, base=None):
+    options = ReadOptions(machine=base and base.machine)
+    reading = read_errors([source_of_text(text, name)], options)
+    return build_imported_scene(reading, base, "imported", name).scene
 
 
 def read(text, name="file.txt", **options):
@@ -166,3 +180,103 @@ def test_reprapfirmware_skew():
     assert read(text, "config.g").constants == pytest.approx(expected)
     reversed_xy = read("M556 S100 X0.7 P1", "config.g")
     assert reversed_xy.curves["EYX"] == {"poly": [0.0, pytest.approx(-7.0)]}
+
+
+@pytest.mark.parametrize("machine", [None, "machine_c_frame_mill"])
+def test_matrixkins_exact_inverse(machine):
+    """Joints are C·p: without the matrix the machine stands at C⁻¹·p."""
+    matrix = np.array([[1.0, 0.02, -0.01], [0.03, 1.0, 0.015], [-0.02, 0.01, 1.001]])
+    text = "".join(
+        f"setp matrixkins.C_{'xyz'[row]}{'xyz'[column]} {matrix[row, column]}\n"
+        for row in range(3)
+        for column in range(3)
+    )
+    base = None if machine is None else load_scene(machine)
+    if base is not None:
+        base = replace(base, errors=ErrorSet({}))
+    scene = imported_scene(text, "m.hal", base)
+    loop = Loop.TOOL if base is None else Loop.RELATIVE
+    corners = np.array([[0.0, 0.0, 0.0], [100.0, 100.0, 100.0]])
+    coordinates = {axis: corners[:, index] for index, axis in enumerate("XYZ")}
+    values = {key: scene.errors.evaluate_at(key, coordinates) for key in scene.errors}
+    point_mm = nominal_point(scene.model, Loop.TOOL, coordinates)
+    error_um, _ = loop_error(scene.model, loop, coordinates, values, point_mm)
+    motion_um = error_um[1] - error_um[0]
+    assert motion_um == pytest.approx(
+        (np.linalg.inv(matrix) - np.eye(3)) @ corners[1] * 1e3, abs=0.02
+    )
+    assert motion_um == pytest.approx([-901.0, -4486.9, 925.9], abs=0.06)
+
+
+GANTRY = """title = "gantry"
+[machine]
+chain = "wFYXZt"
+[machine.travel]
+Y = [0, 400]
+X = [0, 400]
+Z = [0, 50]
+[machine.gantry]
+Y = { span_mm = 1000 }
+[errors]
+EYY = { guides = [-10, 10] }
+"""
+INI = "[TRAJ]\nLINEAR_UNITS = mm\n[KINS]\nKINEMATICS = trivkins coordinates=XYYZ kinstype=BOTH\n"
+INI += "".join(
+    f"[JOINT_{joint}]\nCOMP_FILE = {name}\nCOMP_FILE_TYPE = 0\n"
+    for joint, name in enumerate(("x.comp", "y1.comp", "y2.comp"))
+)
+COMP = {
+    "g.ini": INI,
+    "x.comp": "0 0 0\n100 100.005 100.003\n",
+    "y2.comp": "0 0 0\n400 400.030 400.030\n",
+    "y1.comp": "0 0 0\n400 400.010 400.010\n",
+}
+
+
+def read_comp(*names, machine=None):
+    sources = [source_of_text(COMP[name], name) for name in names]
+    return read_errors(sources, ReadOptions(machine=machine)).imported
+
+
+def test_linuxcnc_joints_of_the_two_guides_of_a_gantry():
+    machine = parse_scene(GANTRY, "gantry").machine
+    errors = {error.key: error for error in read_comp(*COMP, machine=machine).series}
+    assert errors["EYY"].values == pytest.approx([0.0, 20.0])
+    # the second guide leads by 20 µm over 1 m
+    gantry = machine.gantries["Y"]
+    assert errors["ECY"].values == pytest.approx([0.0, 20.0 * gantry.rotation_weight])
+    assert abs(errors["ECY"].values[1]) == pytest.approx(20.0)
+    assert errors["EXX"].in_direction(BACKWARD) == pytest.approx([0.0, 3.0])
+
+
+@pytest.mark.parametrize(
+    ("names", "has_machine", "message"),
+    [
+        (tuple(COMP), False, "two joints of Y, the guides of a gantry.*span_mm"),
+        (("g.ini", "x.comp", "y1.comp"), True, "two joints of Y; expected the files of both"),
+    ],
+)
+def test_linuxcnc_guides_without_their_distance_or_file(names, has_machine, message):
+    machine = parse_scene(GANTRY, "gantry").machine if has_machine else None
+    with pytest.raises(SceneError, match=message):
+        read_comp(*names, machine=machine)
+
+
+@pytest.mark.parametrize(
+    ("variant", "text", "message"),
+    [
+        ("type-1", COMP["x.comp"], "looks like actual positions, but is type-1"),
+        ("type-0", "0 0 0\n100 0.005 0.003\n", "looks like corrections, but is type-0"),
+    ],
+)
+def test_linuxcnc_tables_of_the_other_type_are_refused(variant, text, message):
+    with pytest.raises(SceneError, match=message):
+        read(text, "x.comp", axis="X", variant=variant)
+
+
+def test_linuxcnc_settings_that_are_not_read_are_reported():
+    text = COMP["g.ini"].replace("[JOINT_1]", "[JOINT_3]\nBACKLASH = 0.02\n[JOINT_1]")
+    sources = [source_of_text(text, "g.ini"), source_of_text(COMP["x.comp"], "x.comp")]
+    notes = " ".join(read_errors(sources, ReadOptions()).imported.notes)
+    assert "line 9: ignored BACKLASH = 0.02" in notes
+    assert "y1.comp of Y: not among the files" in notes
