@@ -1,19 +1,25 @@
 """Files as they are found in the shop, after public bug reports and manuals, with their numbers."""
 
+import io
+import zipfile
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from bench_scenes import scene_with
+from warpspace.bench.base import find_test, run_test
+from warpspace.calibration.readings import parse_reading_table
 from warpspace.exceptions import SceneError
 from warpspace.formats.measured import BACKWARD, FORWARD
-from warpspace.formats.registry import ReadOptions, read_errors
+from warpspace.formats.registry import ReadOptions, open_files, read_errors
 from warpspace.formats.source import source_of_text
 from warpspace.formats.to_scene import build_imported_scene
 from warpspace.kinematics.chain import loop_error, nominal_point
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorSet
 from warpspace.scene.library import load_scene, parse_scene
+from warpspace.scene.text_files import match_column
 
 
 def imported_scene(text, name, base=None):
@@ -45,7 +51,10 @@ ENC = [
         ([line.replace("MODULO[1,X]=0", "MODULO[1,X]=FALSE") for line in ENC], ""),
         ([" ".join(ENC[1:3]), *ENC[3:]], ""),
         ([line.replace("=", "  ") for line in ENC], "8 assignments without =, the first in line 2"),
-        ([line.replace("MODULO[1,X]=0", "MODULO[1,X]=-1") for line in ENC], "X does not repeat"),
+        (
+            [line.replace("MODULO[1,X]=0", "MODULO[1,X]=-1") for line in ENC],
+            "line 9: $AA_ENC_COMP_IS_MODULO is -1: the table does not repeat",
+        ),
     ],
 )
 def test_sinumerik_programs_around_the_table(lines, note):
@@ -62,6 +71,10 @@ def test_sinumerik_programs_around_the_table(lines, note):
         ([*ENC, "M6"], "line 10: 'M6'; expected"),
         ([*ENC[:2], ENC[2].replace(".", ","), *ENC[3:]], "line 3: .* has a decimal comma"),
         ([line.replace("MODULO[1,X]=0", "MODULO[1,X]=MAYBE") for line in ENC], "line 9: .*MAYBE"),
+        (
+            [line.replace("X]", "C]").replace("LO[1,C]=0", "LO[1,C]=-1") for line in ENC],
+            "IS_MODULO is -1; expected 0 or 1 for a rotary axis",
+        ),
     ],
 )
 def test_sinumerik_mutations_are_refused_with_their_line(lines, message):
@@ -161,6 +174,12 @@ def test_a_marlin_factor_overrides_the_lengths_and_is_reported():
         (f"{LENGTHS}#define XY_DIAG_AC 141,1\n", "line 5: .* decimal comma"),
         (f"{LENGTHS}#define XY_DIAG_AC 141.1\n", "line 5: XY_DIAG_AC is defined twice"),
         ("M852 I0.1 S0.2", "line 1: M852 sets XY twice"),
+        ("M852 I0.1 j0.2", "line 1: .* expected M852 with I, J, K or S"),
+        ("echo:Skew Factor: XY: -0.003 XQ: 0.1", "line 1: .* expected XY: number"),
+        ("SET_SKEW XY=141,142,100 xz=141,142,100", "line 1: .* expected SET_SKEW with XY="),
+        ("setp matrixkins.C_xy 0.1\nsetp matrixkin.C_yx 0.1\n", "line 2: 'setp matrixkin.C_yx"),
+        ("setp matrixkins.C_xy 0.1\nsetp matrixkins.C_yx\n", "line 2: 'setp matrixkins.C_yx'"),
+        ("M556 S100 X0.7 0.2", "line 1: .*each once"),
         ("M556 X-0.5", "line 1: .* without a length"),
         ("M556 S100 X0.7 X0.2", "line 1: .*each once"),
         ("M556 S100 X0.7 Q1", "line 1: .*each once"),
@@ -280,3 +299,159 @@ def test_linuxcnc_settings_that_are_not_read_are_reported():
     notes = " ".join(read_errors(sources, ReadOptions()).imported.notes)
     assert "line 9: ignored BACKLASH = 0.02" in notes
     assert "y1.comp of Y: not among the files" in notes
+
+
+RUNS = {
+    (1, "+"): (0.4, 1.7, 2.5), (1, "-"): (-2.3, -1.1, 0.1),
+    (2, "+"): (0.3, 1.0, 2.4), (2, "-"): (-2.2, -1.0, 0.2),
+}  # fmt: skip
+TARGETS = (6.711, 175.077, 353.834)
+ROWS = [
+    (run, way, target, value)
+    for (run, way), values in RUNS.items()
+    for target, value in zip(TARGETS, values, strict=True)
+]
+
+
+def sheet(head="run,direction,target_mm,deviation_um", ways=("+", "-"), scale=1.0):
+    spelled = dict(zip("+-", ways, strict=True))
+    lines = [f"{run},{spelled[way]},{q!r},{scale * v:.7g}" for run, way, q, v in ROWS]
+    return "\n".join([head, *lines]) + "\n"
+
+
+def german(text):
+    return text.replace(",", ";").replace(".", ",")
+
+
+WIDE = "\n".join([
+    "Target [mm];1↑;1↓;2↑;2↓",
+    *(
+        f"{target};" + ";".join(str(values[index]) for values in RUNS.values())
+        for index, target in enumerate(TARGETS)
+    ),
+])  # fmt: skip
+SHEETS = {
+    "as documented": sheet().encode(),
+    "German": german(sheet()).encode("utf-8-sig"),
+    "UTF-16": german(sheet()).replace(";", "\t").encode("utf-16"),
+    "Windows-1252": sheet("run,direction,Target [mm],deviation [µm]").encode("cp1252"),
+    "mm": sheet("run,direction,target_mm,deviation_mm", scale=1e-3).encode(),
+    "inch": sheet("run,direction,target_mm,deviation_in", scale=1 / 25_400).encode(),
+    "arrows": sheet(ways=("↑", "↓")).encode(),
+    "words": sheet(ways=("Forward", "Reverse")).encode(),
+    "U+2212": sheet(ways=("+", "−")).replace(",-", ",−").encode(),
+    "point names": "\n".join(f"{a},{b}" for a, b in zip(
+        ["pt", *("P1" for _ in ROWS)], sheet().splitlines(), strict=True,
+    )).encode(),
+    "runs in columns": WIDE.encode(),
+    "runs in columns with unit": WIDE.replace("↑", " + [µm]").replace("↓", " - [µm]").encode(),
+    "preamble": f"Report;laser\nDate;2024-05-01\n\n{WIDE}".encode(),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_laser_sheets_are_read_alike_by_test_and_import(name, tmp_path):
+    path = tmp_path / "laser.csv"
+    path.write_bytes(SHEETS[name])
+    measured = run_test(scene_with(), find_test("positioning")(axis="X"), path).runs[1]
+    assert sorted(measured.readings.tolist()) == pytest.approx(sorted(row[3] for row in ROWS))
+    (exx,) = read_errors(open_files([path]), ReadOptions(axis="X")).imported.series
+    assert exx.in_direction(FORWARD) == pytest.approx([0.35, 1.35, 2.45])
+    assert exx.in_direction(BACKWARD) == pytest.approx([-2.25, -1.05, 0.15])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (sheet(ways=("+", "sideways")), 'line 5, direction: "sideways"; expected'),
+        (sheet(ways=("cw", "ccw")), 'line 2, direction: "cw"; expected'),
+        (sheet("run,direction,target_mm,deviation"), "'deviation_um' not found"),
+        (sheet("run,direction,target_mm,deviation_deg"), "'deviation_um' not found"),
+        (sheet("run,direction,target_V,deviation_um"), "'target_mm' not found"),
+    ],
+)
+def test_laser_sheets_that_are_not_understood_are_refused(text, message, tmp_path):
+    path = tmp_path / "laser.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError, match=message):
+        run_test(scene_with(), find_test("positioning")(axis="X"), path)
+
+
+def test_a_sheet_without_its_axis_asks_for_it():
+    with pytest.raises(SceneError, match="line 1: column 'target_mm' does not state its axis"):
+        read(sheet(), "laser.csv")
+
+
+def test_ball_bar_directions_in_words(tmp_path):
+    figures: list[object] = []
+    for ways in (("+", "-"), ("CCW", "cw")):
+        rows = [
+            f"{way},{q},{np.sin(q + n)}" for n, way in enumerate(ways) for q in range(0, 360, 5)
+        ]
+        path = tmp_path / "bar.csv"
+        path.write_text("\n".join(["direction,angle_deg,radial_um", *rows]), encoding="utf-8")
+        figures.append(
+            run_test(scene_with(), find_test("circular")(), path).runs[1].readings.tolist()
+        )
+    assert figures[0] == figures[1]
+
+
+def test_a_short_column_of_positions_is_no_deviation():
+    assert match_column("x_um", ["x_mm"]) is None
+    assert match_column("x_mm", ["X_in"]) == (0, pytest.approx(25.4))
+    assert match_column("j1_deg", ["j1_rad"]) == (0, pytest.approx(180.0 / np.pi))
+    assert match_column("radial_um", ["radius_mm"]) is None
+
+
+def test_calibration_ignores_columns_that_it_does_not_need():
+    table = parse_reading_table("Pt,Date,j1_rad,x_mm\nP1,2024-05-01,1.5,2\n", "t.csv")
+    assert table.require(("j1_deg", "x_mm"))[0] == pytest.approx([np.rad2deg(1.5), 2.0])
+    with pytest.raises(SceneError, match='line 2, pt: "P1"; expected a finite number'):
+        table.require(("pt",))
+
+
+def xlsx(rows):
+    """Build the smallest workbook with one sheet."""
+    cells = "".join(
+        "<row>" + "".join(
+            f"<c><v>{cell}</v></c>" if isinstance(cell, float)
+            else f'<c t="inlineStr"><is><t>{cell}</t></is></c>'
+            for cell in row
+        ) + "</row>"
+        for row in rows
+    )  # fmt: skip
+    head = '<?xml version="1.0" encoding="UTF-8"?>'
+    main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+    relations = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+    package = "http://schemas.openxmlformats.org/package/2006"
+    parts = {
+        "[Content_Types].xml": f'<Types xmlns="{package}/content-types"><Default Extension="xml"'
+        ' ContentType="application/xml"/><Default Extension="rels" ContentType="application/vnd.'
+        'openxmlformats-package.relationships+xml"/></Types>',
+        "_rels/.rels": f'<Relationships xmlns="{package}/relationships"><Relationship Id="r1"'
+        f' Type="{relations}/officeDocument" Target="xl/workbook.xml"/></Relationships>',
+        "xl/workbook.xml": f'<workbook xmlns="{main}" xmlns:r="{relations}"><sheets><sheet'
+        ' name="Laser" sheetId="1" r:id="r1"/></sheets></workbook>',
+        "xl/_rels/workbook.xml.rels": f'<Relationships xmlns="{package}/relationships">'
+        f'<Relationship Id="r1" Type="{relations}/worksheet" Target="worksheets/sheet1.xml"/>'
+        "</Relationships>",
+        "xl/worksheets/sheet1.xml": f'<worksheet xmlns="{main}"><sheetData>{cells}</sheetData>'
+        "</worksheet>",
+    }
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for name, text in parts.items():
+            archive.writestr(name, head + text)
+    return content.getvalue()
+
+
+def test_spreadsheets(tmp_path):
+    pytest.importorskip("python_calamine")
+    rows = [["Laser report"], ["X [mm]", "EXX [µm]"], [0.0, 0.0], [100.0, -1.5]]
+    path = tmp_path / "laser.xlsx"
+    path.write_bytes(xlsx(rows))
+    imported = read_errors(open_files([path]), ReadOptions()).imported
+    (exx,) = imported.series
+    assert exx.positions == (0.0, 100.0)
+    assert exx.values == pytest.approx([0.0, -1.5])
+    assert "read sheet 'Laser'" in imported.notes

@@ -132,10 +132,10 @@ def _combined(tables: Sequence[AxisTable], weights: Sequence[float]) -> AxisTabl
         sum(weight * table.at(at, way) for weight, table in zip(weights, tables, strict=True))
         for way in (1, -1)
     )
-    values = tuple(np.asarray(forward).tolist()), tuple(np.asarray(backward).tolist())
+    upwards, downwards = (tuple(np.asarray(moves).tolist()) for moves in (forward, backward))
     axis = tables[0].source
-    both = () if values[0] == values[1] else values[1]
-    return AxisTable(axis, axis, tuple(at.tolist()), values[0], backward=both)
+    reverse = () if upwards == downwards else downwards
+    return AxisTable(axis, axis, tuple(at.tolist()), upwards, backward=reverse)
 
 
 def _joint_tables(
@@ -260,7 +260,7 @@ def _read_matrix(sources: Sequence[Source], options: ReadOptions) -> Tables:
     coefficients: dict[tuple[str, str], float] = {}
     for source in sources:
         for at, bare in source.scan("#"):
-            if "matrixkins.C_" not in bare:
+            if not re.search(r"\bC_[a-z]", bare, re.IGNORECASE):
                 continue
             matched = _SETP.fullmatch(bare)
             if matched is None:
@@ -308,8 +308,8 @@ def _exact_errors(imported: ImportedErrors, machine: Machine) -> ImportedErrors:
 
     def error_um(*, exact: bool) -> Array:
         errors = rotations | {key: slope * at[key[2:]] for key, slope in slopes.items()}
-        values = {key: np.asarray(error) for key, error in errors.items()}
-        return loop_error(model, Loop.RELATIVE, at, values, point_mm, exact=exact)[0]
+        arrays = {key: np.asarray(error) for key, error in errors.items()}
+        return loop_error(model, Loop.RELATIVE, at, arrays, point_mm, exact=exact)[0]
 
     nominal_um = error_um(exact=False)
     zero = dict.fromkeys(machine.axes, np.zeros(()))

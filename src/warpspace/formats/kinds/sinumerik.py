@@ -88,6 +88,8 @@ class AssignmentTable:
             self.at.refuse(f"{problem} ({steps:.4g})", "equal steps from start to end")
         if round(steps) > MAX_INDEX:
             self.at.refuse(f"{label}: {round(steps):,} steps", f"at most {MAX_INDEX:,}")
+        if self.switches.get(IS_MODULO) == -1 and not is_linear(axes[0]):
+            self.at.refuse(f"{label}: ${prefix}_{IS_MODULO} is -1", "0 or 1 for a rotary axis")
         last = round(steps)
         missing = next((index for index in range(last + 1) if index not in self.values), None)
         if missing is not None:
@@ -100,23 +102,9 @@ class AssignmentTable:
             *axes,
             tuple((start + step * np.arange(last + 1, dtype=np.float64)).tolist()),
             tuple(factor * self.values[index] for index in range(last + 1)),
-            is_modulo=self.is_modulo(axes[0]),
+            is_modulo=self.switches.get(IS_MODULO) == 1,
             direction=self.switches.get("DIRECTION", 0),
         )
-
-    def is_modulo(self, axis: str) -> bool:
-        """Return true if the table repeats; −1, as some programs write, is TRUE in the control.
-
-        A linear axis has no modulo range, so that its table does not repeat.
-        """
-        switch = self.switches.get(IS_MODULO, 0)
-        return switch == 1 or (switch == -1 and not is_linear(axis))
-
-    def modulo_notes(self, axis: str, label: str) -> tuple[str, ...]:
-        if self.switches.get(IS_MODULO) != -1:
-            return ()
-        effect = "repeats" if self.is_modulo(axis) else "does not repeat"
-        return (f"{label}: IS_MODULO is -1; expected 0 or 1: the table over {axis} {effect}",)
 
 
 def _assigns(name: str) -> Callable[[str, str], bool]:
@@ -203,8 +191,10 @@ def _read(source: Source, prefix: str, notes: list[str]) -> dict[tuple[int, str]
         elif setting in RANGE:
             table.numbers[setting] = at.number(text, name)
         elif setting:
-            value = CONSTANTS.get(text.upper(), text) if setting == IS_MODULO else text
-            table.switches[setting] = at.integer(value, name, *SWITCHES[setting])
+            number_text = CONSTANTS.get(text.upper(), text) if setting == IS_MODULO else text
+            table.switches[setting] = at.integer(number_text, name, *SWITCHES[setting])
+            if setting == IS_MODULO and table.switches[setting] == -1:
+                notes.append(f"line {at.line}: {name} is -1: the table does not repeat")
         else:
             index = _index(parts[1], at)
             if index in table.values:
@@ -224,7 +214,6 @@ def _read_enc(sources: Sequence[Source], options: ReadOptions) -> Tables:
             if any(term.source == axis for term in terms):
                 table.at.refuse(f"{label}: {axis} has a table already", "one per axis")
             terms.append(table.to_axis_table((axis, axis), ENC, label, options.factor(ERROR)))
-            notes += table.modulo_notes(axis, label)
             if encoder:
                 notes.append(f"{name}: read the table of measuring system {encoder + 1}")
     return Tables(tuple(terms), (options.sign_statement(SIGN), UNITS), tuple(notes))
@@ -261,7 +250,6 @@ def _read_cec(sources: Sequence[Source], options: ReadOptions) -> Tables:
                     table.at.refuse(problem, "it (is the file truncated?)")
             along, target = (options.axis_named(table.axes[role], table.at) for role in AXES)
             lines[index] = table.to_axis_table((along, target), CEC, label, factor)
-            notes += table.modulo_notes(along, label)
         terms += lines.values()
         for index, table in tables.items():
             other = table.switches.get(FACTOR, 0) - 1

@@ -144,7 +144,10 @@ def _set_skew(at: SourceLine, command: str, factors: dict[str, float], notes: li
     if re.search(r"CLEAR\s*=\s*1", command):
         factors.clear()
         return
-    for plane, value in _SET.findall(command):
+    parameters = re.split("[;#]", command.partition("SET_SKEW")[2])[0]
+    if _SET.sub("", parameters).strip():
+        at.refuse(at.quoted, "SET_SKEW with XY=, XZ=, YZ= or CLEAR=1")
+    for plane, value in _SET.findall(parameters):
         parts = value.split(",")
         if len(parts) != 3:
             at.refuse(f"{plane}={value}", "three lengths AC,BD,AD in mm")
@@ -334,12 +337,16 @@ def _read_marlin(source: Source, factors: Settings, defined: dict[str, Settings]
                 at.refuse(f"{define[1]}_{define[2]} is defined twice", "it once")
             settings[define[2]] = (at, number)
         elif bare.startswith("Skew Factor:"):
+            if _REPORTED.sub("", bare.partition(":")[2]).strip():
+                at.refuse(at.quoted, "XY: number XZ: number YZ: number")
             for plane, number in _REPORTED.findall(bare):
                 factors[plane] = (at, at.number(number, plane))
         elif re.match(r"M852\b", bare):
-            words = _WORD.findall(bare[4:])
-            planes = [LETTERS.get(letter, "") for letter, _ in words]
-            for plane, (letter, number) in zip(planes, words, strict=True):
+            if _WORD.sub("", bare[4:]).strip():
+                at.refuse(at.quoted, "M852 with I, J, K or S")
+            parameters = _WORD.findall(bare[4:])
+            planes = [LETTERS.get(letter, "") for letter, _ in parameters]
+            for plane, (letter, number) in zip(planes, parameters, strict=True):
                 if not plane:
                     at.refuse(f"M852 {letter}", "I, J, K or S")
                 if planes.count(plane) > 1:
@@ -391,11 +398,12 @@ def _read_m556(sources: Sequence[Source], options: ReadOptions) -> Tables:
     for source in sources:
         for at, bare in source.scan(";"):
             command = _M556.fullmatch(bare)
-            words = _WORD.findall(command[1].upper()) if command else []
-            numbers = {letter: at.number(text, f"M556 {letter}") for letter, text in words}
+            parameters = _WORD.findall(command[1].upper()) if command else []
+            numbers = {letter: at.number(text, f"M556 {letter}") for letter, text in parameters}
             if not numbers:
                 continue
-            if len(numbers) < len(words) or not numbers.keys() <= {*"SXYZP"}:
+            is_unknown = command is not None and _WORD.sub("", command[1].upper()).strip()
+            if is_unknown or len(numbers) < len(parameters) or not numbers.keys() <= {*"SXYZP"}:
                 at.refuse(at.quoted, "S, X, Y, Z and P, each once")
             length = numbers.pop("S", 0.0)
             if length <= 0.0:
