@@ -159,9 +159,14 @@ def test_matrixkins_squareness_of_printed_diagonals():
 def test_matrixkins_shear_is_the_squareness_of_y():
     text = "setp matrixkins.C_xx 1\nsetp matrixkins.C_xy 0.01695\nsetp matrixkins.C_yy 1.0001\n"
     found = imported(text)
-    assert found.constants == {"EC0Y": pytest.approx(16950.0)}
-    # the joint moves 0.1 mm/m further than commanded: the axis would be that much short
-    assert found.curves == {"EYY": {"poly": [0.0, pytest.approx(-0.1)]}}
+    # the joints are C·p: without the matrix the machine stands at C⁻¹·p
+    assert found.constants == {"EC0Y": pytest.approx(16950.0 / 1.0001)}
+    # the joint moves 0.1 mm/m further than commanded: the axis would be that much short, were it
+    # not for the cosine of its rotation
+    cosine = math.cos(16950.0e-6 / 1.0001)
+    scale_um_per_mm = 1e3 * (1.0 / 1.0001 - cosine)
+    assert found.curves["EYY"] == {"poly": [0.0, pytest.approx(scale_um_per_mm, abs=1e-4)]}
+    assert {key for key, curve in found.curves.items() if abs(curve["poly"][1]) > 1e-3} == {"EYY"}
 
 
 def test_klipper_printed_lengths():

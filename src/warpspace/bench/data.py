@@ -3,7 +3,7 @@
 import io
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -15,7 +15,6 @@ from warpspace.scene import text_files
 from warpspace.units import Array
 
 ColumnKind = Literal["number", "reading", "sign", "name"]
-SIGNS = {"+": 1.0, "+1": 1.0, "1": 1.0, "-": -1.0, "−": -1.0, "-1": -1.0}
 FACTOR = 300.0
 """Readings this much larger or smaller than expected are likely to be in another unit."""
 LEAST_UM = 0.05  # readings that are all below it are likely to be in millimetres
@@ -28,12 +27,18 @@ class DataColumn:
     name: str  # in the header, with its unit
     # "reading" for measured values in µm or µrad, "number" for positions, "sign" for + or −
     kind: ColumnKind = "reading"
-    names: tuple[str, ...] = ()  # allowed names; any if empty
+    # allowed names, any if empty; of a sign, other spellings of + and −
+    names: tuple[str, ...] = ()
     default: float | str | None = None  # if the file lacks the column; None: required
 
 
-DIRECTION, ANGLE = DataColumn("direction", "sign", default="+"), DataColumn("angle_deg", "number")
-ALONG = (DIRECTION, DataColumn("position_mm", "number"), DataColumn("deviation_um"))
+DIRECTION = DataColumn("direction", "sign", ("ccw", "cw"), default="+")
+ANGLE = DataColumn("angle_deg", "number")
+ALONG = (
+    replace(DIRECTION, names=()),
+    DataColumn("position_mm", "number"),
+    DataColumn("deviation_um"),
+)
 XYZ = tuple(DataColumn(f"{letter}_um") for letter in "xyz")
 
 
@@ -73,8 +78,9 @@ class ReadingsFile:
 def read_table(path: str | Path, columns: Sequence[DataColumn]) -> ReadingsFile:
     """Read a file of readings; further columns are ignored."""
     source = str(path)
-    text = text_files.read_text(Path(path), MAX_CSV_BYTES, source)
-    return parse_table(text, columns, source)
+    text, notes = text_files.read_table_text(Path(path), MAX_CSV_BYTES)
+    table = parse_table(text, columns, source)
+    return replace(table, notes=(*notes, *table.notes))
 
 
 def parse_table(text: str, columns: Sequence[DataColumn], source: str) -> ReadingsFile:
@@ -82,8 +88,11 @@ def parse_table(text: str, columns: Sequence[DataColumn], source: str) -> Readin
     if not rows.header:
         raise SceneError(source, ["is empty; expected a header " + _header(columns)])
     header = [text_files.plain_heading(name) for name in rows.header]
-    _check_header(header, rows.line, columns, source)
-    present = [(column, header.index(column.name)) for column in columns if column.name in header]
+    unit_note = _state_unit(header, columns) if rows.runs else ()
+    matches = {column.name: text_files.match_column(column.name, header) for column in columns}
+    _check_header(header, rows.line, columns, source, matches)
+    present = [(column, matches[column.name] or (0, 1.0)) for column in columns]
+    present = [pair for pair in present if matches[pair[0].name]]
     values: dict[str, list[float]] = {
         column.name: [] for column in columns if column.kind != "name"
     }
@@ -91,37 +100,53 @@ def parse_table(text: str, columns: Sequence[DataColumn], source: str) -> Readin
     lines: list[int] = []
     for line, row in rows:
         lines.append(line)
-        for column, index in present:
+        for column, (index, factor) in present:
             if column.kind == "name":
                 labels[column.name].append(_word(column, line, row[index], rows))
             else:
-                values[column.name].append(_value(column, line, row[index], rows))
+                values[column.name].append(_value(column, line, row[index], rows, factor))
     rows.check()
     if not lines:
         raise SceneError(source, ["has no readings below its header"])
     for column in columns:
-        if column.name not in header and column.kind != "name":
-            default = SIGNS.get(str(column.default), column.default)
+        if matches[column.name] is None and column.kind != "name":
+            default = text_files.DIRECTIONS.get(str(column.default), column.default)
             values[column.name] = [float(default or 0.0)] * len(lines)
     return ReadingsFile(
         source,
         {name: np.array(column) for name, column in values.items()},
         {name: tuple(column) for name, column in labels.items()},
         np.array(lines, dtype=float),
-        (*rows.notes, *text_files.radian_notes(values)),
+        (*rows.notes, *unit_note, *text_files.radian_notes(values)),
     )
+
+
+def _state_unit(header: list[str], columns: Sequence[DataColumn]) -> tuple[str, ...]:
+    """Assign the unit of the test to runs in columns without one; return a note on it."""
+    names = [column.name for column in columns if column.name.startswith(text_files.DEVIATION)]
+    if text_files.DEVIATION not in header or not names:
+        return ()
+    header[header.index(text_files.DEVIATION)] = names[0]
+    unit = names[0].rpartition("_")[2].replace("u", "µ", 1)
+    return (f"runs without a unit: read as {unit}",)
 
 
 def _header(columns: Sequence[DataColumn]) -> str:
     return ",".join(column.name for column in columns)
 
 
-def _check_header(header: list[str], line: int, columns: Sequence[DataColumn], source: str) -> None:
+def _check_header(
+    header: list[str],
+    line: int,
+    columns: Sequence[DataColumn],
+    source: str,
+    matches: Mapping[str, object],
+) -> None:
     problems: list[str] = []
     for column in columns:
         if header.count(column.name) > 1:
             problems.append(f"line {line}: column {column.name!r} stands there twice")
-        if column.default is None and column.name not in header:
+        if column.default is None and matches[column.name] is None:
             hint = near_miss(column.name, header) if len(header) > 1 else ""
             hint = hint if "did you mean" in hint else f"; the header is {','.join(header)[:200]}"
             hint = hint.replace("did you mean", "is it")
@@ -131,16 +156,19 @@ def _check_header(header: list[str], line: int, columns: Sequence[DataColumn], s
         raise SceneError(source, problems)
 
 
-def _value(column: DataColumn, line: int, text: str, rows: text_files.CsvRows) -> float:
+def _value(
+    column: DataColumn, line: int, text: str, rows: text_files.CsvRows, factor: float
+) -> float:
     if column.kind == "sign":
         text = text_files.unguard_cell(text)
-        if text not in SIGNS:
+        signs = {**text_files.DIRECTIONS, **dict(zip(column.names, (1, -1), strict=False))}
+        if text.lower() not in signs:
             rows.note(
                 f"line {line}, {column.name}: {text_files.spell_value(text)}; expected + or -"
             )
-        return SIGNS.get(text, math.nan)
+        return signs.get(text.lower(), math.nan)
     hint = ", in µm or µrad: is the file in nm?" if column.kind == "reading" else ""
-    return rows.number(text, line, column.name, MAX_ERROR, hint)
+    return factor * rows.number(text, line, column.name, MAX_ERROR / factor, hint)
 
 
 def _word(column: DataColumn, line: int, text: str, rows: text_files.CsvRows) -> str:

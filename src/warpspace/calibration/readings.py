@@ -3,7 +3,7 @@
 import io
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,13 @@ from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.axes import is_linear
 from warpspace.resources import assets_dir
 from warpspace.scene.model import Scene, coverage_notes
-from warpspace.scene.text_files import CsvRows, plain_heading, radian_notes, unguard_cell
+from warpspace.scene.text_files import (
+    CsvRows,
+    match_column,
+    plain_heading,
+    radian_notes,
+    unguard_cell,
+)
 from warpspace.units import Array
 
 MAX_READINGS = 20_000  # rows that a file of readings may have
@@ -34,12 +40,14 @@ class ReadingTable:
     """The rows of a file of readings."""
 
     source: str  # name of the file, for messages
-    columns: Mapping[str, Array]  # [n]; numbers by column name, in lower case
+    columns: Mapping[str, Array]  # [n]; numbers by column name, in lower case; see `column`
     labels: Mapping[str, tuple[str, ...]]  # (n,); text by column: `session`, `run`, `time`
     lines: tuple[int, ...]  # (n,); line of each row in the file
     text: str = ""  # the entire file, for kinds that parse it themselves
     notes: tuple[str, ...] = ()  # warnings on the file
     frame: str | None = None  # of vectors whose columns do not name it, as stated by the user
+    # problems of columns with cells that are not numbers, raised where such a column is needed
+    problems: Mapping[str, Sequence[str]] = field(default_factory=dict[str, Sequence[str]])
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -47,16 +55,28 @@ class ReadingTable:
     def refuse(self, problem: str) -> SceneError:
         return SceneError(self.source, [problem])
 
+    def column(self, name: str) -> Array | None:
+        """Return a column, [n], converted to the unit in the name; None where it is missing."""
+        headings = list(self.columns)
+        match = match_column(name, headings)
+        if match is None:
+            return None
+        heading = headings[match[0]]
+        if heading in self.problems:
+            raise SceneError(self.source, self.problems[heading])
+        return match[1] * self.columns[heading]
+
     def require(self, names: Sequence[str]) -> Array:
         """Return required columns, [n, len(names)]; raise SceneError where one is missing."""
-        missing = [name for name in names if name not in self.columns]
+        arrays = {name: self.column(name) for name in names}
+        missing = [name for name, column in arrays.items() if column is None]
         if missing:
             present = ", ".join((*self.labels, *self.columns)) or "none"
             problem = f"has no column {', '.join(missing)}{near_miss(missing[0], self.columns)}"
             raise self.refuse(
                 f"{problem}; expected {', '.join(names)} (columns in the file: {present})"
             )
-        return np.column_stack([self.columns[name] for name in names])
+        return np.column_stack([column for column in arrays.values() if column is not None])
 
     @property
     def session(self) -> tuple[str, ...]:
@@ -76,26 +96,32 @@ def parse_reading_table(text: str, source: str) -> ReadingTable:
     repeated = {name for name in header if header.count(name) > 1}
     if repeated:
         raise SceneError(source, [f"names column {min(repeated)!r} twice; expected each once"])
+    problems: dict[str, list[str]] = {}
     numbers: dict[str, list[float]] = {name: [] for name in header if name not in TEXTS}
     labels: dict[str, list[str]] = {name: [] for name in header if name in TEXTS}
     lines: list[int] = []
     for line, row in rows:
         lines.append(line)
-        for name, field in zip(header, row, strict=True):
+        for name, cell in zip(header, row, strict=True):
             if name in labels:
-                labels[name].append(unguard_cell(field)[:MAX_LABEL])
+                labels[name].append(unguard_cell(cell)[:MAX_LABEL])
             else:
-                numbers[name].append(rows.number(field, line, name, MAX_NUMBER))
+                count = len(rows.problems)
+                numbers[name].append(rows.number(cell, line, name, MAX_NUMBER))
+                problems.setdefault(name, []).extend(rows.problems[count:])
+                del rows.problems[count:]
     rows.check()
     if not lines:
         raise SceneError(source, ["has a header but no rows; expected readings below it"])
+    readable = {name: values for name, values in numbers.items() if not problems[name]}
     table = ReadingTable(
         source,
         {name: np.array(values) for name, values in numbers.items()},
         {name: tuple(values) for name, values in labels.items()},
         tuple(lines),
         text,
-        (*rows.notes, *radian_notes(numbers)),
+        (*rows.notes, *radian_notes(readable)),
+        problems={name: texts for name, texts in problems.items() if texts},
     )
     count = len(set(table.session))
     if count > MAX_SESSIONS:
@@ -200,8 +226,9 @@ def axis_columns(
     notes: list[str] = []
     for name in names:
         for column in (columns[name], f"axis_{name.lower()}_{columns[name].rpartition('_')[2]}"):
-            if column in table.columns:
-                coordinates[name] = table.columns[column]
+            positions = table.column(column)
+            if positions is not None:
+                coordinates[name] = positions
     missing = [name for name in names if name not in coordinates]
     required = [columns[name] for name in missing if name in scene.machine.columns]
     if required:
@@ -249,8 +276,9 @@ def build_readings(
 def uncertainties_mm(table: ReadingTable) -> Array | None:
     """Read standard uncertainties, column ``u_um`` or ``u_mm``, [n], mm; None without one."""
     for name, factor in (("u_um", 1e-3), ("u_mm", 1.0)):
-        if name in table.columns:
-            values = table.columns[name] * factor
+        column = table.column(name)
+        if column is not None:
+            values = column * factor
             for line, value in zip(table.lines, values, strict=True):
                 if value <= 0.0:
                     problem = f"line {line}, {name} = {value / factor:g}"

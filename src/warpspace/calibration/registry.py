@@ -30,7 +30,7 @@ from warpspace.calibration.spheres import SphereKind, SphereTcp
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.machine.limits import MAX_CSV_BYTES, MAX_ERROR
 from warpspace.scene.model import Scene
-from warpspace.scene.text_files import parse_number, read_text
+from warpspace.scene.text_files import parse_number, read_table_text
 from warpspace.units import MM_PER_UM, Array
 
 
@@ -161,7 +161,9 @@ def read_readings(
 ) -> Readings:
     """Read a file of readings, or a bundled one; the kind is recognised if it is not stated."""
     path = find_data(name)
-    return parse_readings(read_text(path, MAX_CSV_BYTES), str(path), scene, kind, frame)
+    text, notes = read_table_text(path, MAX_CSV_BYTES)
+    readings = parse_readings(text, str(path), scene, kind, frame)
+    return replace(readings, notes=(*readings.notes, *notes))
 
 
 def parse_readings(

@@ -170,9 +170,8 @@ def circles_of(table: ReadingTable, scene: Scene) -> tuple[Circle, ...]:
     """Fit a circle per run in which one rotary axis turns, and one per axis to all such runs."""
     read, labels = table.require(READ), np.array(table.session)
     columns = {name: f"{name.lower()}_deg" for name in rotary_axes(scene)}
-    turned = {
-        name: table.columns[column] for name, column in columns.items() if column in table.columns
-    }
+    positions = {name: table.column(column) for name, column in columns.items()}
+    turned = {name: at for name, at in positions.items() if at is not None}
     runs: dict[str, list[str]] = {}
     for session in dict.fromkeys(labels.tolist()):
         members = labels == session

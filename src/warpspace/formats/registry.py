@@ -194,6 +194,8 @@ def recognise(sources: Sequence[Source]) -> Format:
         head, name = source.head, source.name
         kind = next((kind for kind in formats() if kind.recognise(head, name)), None)
         if kind is None:
+            _refuse_unpublished(name, head=head)
+            _refuse_ending(name)
             names = ", ".join(kind.name for kind in formats())
             hint = "(--format NAME selects it; `warpspace import --formats` lists their contents)"
             expected = f"one of {names} {hint}"
@@ -216,15 +218,33 @@ class Reading:
     recognised: bool  # from the files; otherwise the user stated the format
 
 
-def open_upload(name: str, content: bytes) -> Source:
-    """Read an uploaded file; formats whose structure is not published are refused."""
-    lower = name.lower()
+def _refuse_unpublished(name: str, content: bytes = b"", head: str = "") -> None:
+    """Raise an error for a file that no format reads, by its content."""
     for kind in _catalogue()["unpublished"]:
         starts = tuple(start.encode("latin-1") for start in kind.get("starts", ()))
-        if content.startswith(starts) or lower.endswith(tuple(kind["endings"])):
+        pattern = kind.get("pattern", "")
+        if content.startswith(starts) or (pattern and re.search(pattern, head, re.MULTILINE)):
             problem = f"is {kind['what']}; expected another file: {kind['instead']}"
             raise SceneError(name, [problem])
-    return source_of_bytes(content, name)
+
+
+def _refuse_ending(name: str) -> None:
+    """Raise an error for a file that no format reads, by its ending."""
+    for kind in _catalogue()["unpublished"]:
+        ending = next((end for end in kind["endings"] if name.lower().endswith(end)), "")
+        if ending:
+            problem = f"matches no known format; {ending} may be {kind['what']}"
+            raise SceneError(name, [f"{problem}; expected another file: {kind['instead']}"])
+
+
+def open_upload(name: str, content: bytes) -> Source:
+    """Read an uploaded file; formats whose structure is not published are refused."""
+    _refuse_unpublished(name, content)
+    try:
+        return source_of_bytes(content, name)
+    except SceneError:
+        _refuse_ending(name)
+        raise
 
 
 def open_files(paths: Sequence[Path]) -> list[Source]:

@@ -9,26 +9,23 @@ from typing import NoReturn
 
 from warpspace.exceptions import SceneError
 from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM
-from warpspace.scene.text_files import CsvRows, one_line, parse_number
+from warpspace.scene.text_files import (
+    ANGLE_URAD,
+    LENGTH_UM,
+    CsvRows,
+    decode_text,
+    one_line,
+    parse_number,
+)
 
-UM_PER: Mapping[str, float] = {
-    **dict.fromkeys(("um", "µm", "μm"), 1.0),
-    "mm": 1e3,
-    "nm": 1e-3,
-    "m": 1e6,
-    "in": 25_400.0,
-    "inch": 25_400.0,
-}
+UM_PER: Mapping[str, float] = {**LENGTH_UM, **dict.fromkeys(("µm", "μm"), 1.0)}
 """Micrometres per unit of length."""
 URAD_PER: Mapping[str, float] = {
-    **dict.fromkeys(("urad", "µrad", "μrad"), 1.0),
-    "mrad": 1e3,
-    "rad": 1e6,
-    "arcsec": math.pi / 180.0 / 3600.0 * 1e6,
-    **dict.fromkeys(("deg", "°"), math.pi / 180.0 * 1e6),
-    "um/m": 1.0,
-    "µm/m": 1.0,
+    **ANGLE_URAD,
+    **dict.fromkeys(("µrad", "μrad", "um/m", "µm/m"), 1.0),
     "mm/m": 1e3,
+    "°": ANGLE_URAD["deg"],
+    **dict.fromkeys(('"', "″"), ANGLE_URAD["arcsec"]),
 }
 """Microradians per unit of angle."""
 MM_PER: Mapping[str, float] = {unit: size * 1e-3 for unit, size in UM_PER.items()}
@@ -68,8 +65,6 @@ MAX_LINES = 2_000_000
 MAX_LINE = 16_384  # characters of one line
 HEAD_LINES = 60  # by which a format is recognised
 MAX_QUOTED = 60  # characters of a line in a message
-_UTF16_SHARE = 0.3
-"""Smallest share of zero bytes at every other position of UTF-16 without a byte order mark."""
 _LINE_ENDS = re.compile(r"\r\n|\n|\r")
 
 
@@ -170,13 +165,18 @@ class SourceLine:
 
     def unit(self, unit: str, factors: Mapping[str, float], quantity: str) -> float:
         if unit not in factors:
-            units = ", ".join(name for name in factors if name.isascii())
+            units = unit_list(factors)
             self.refuse(f"{quantity} in {quote(unit)}", f"one of the units {units}")
         return factors[unit]
 
     def ascending(self, value: float, before: float, quantity: str, of: str = "") -> None:
         if value <= before:
             self.refuse(f"{quantity} {value:g}{of} after {before:g}", "ascending positions")
+
+
+def unit_list(factors: Mapping[str, float]) -> str:
+    """List the units that are words in ASCII, for a message."""
+    return ", ".join(name for name in factors if name.isascii() and name[0].isalpha())
 
 
 def quote(text: str) -> str:
@@ -189,7 +189,7 @@ def source_of_bytes(content: bytes, name: str) -> Source:
     if len(content) > MAX_BYTES:
         problem = f"is {len(content):,} bytes long; expected at most {MAX_BYTES:,} bytes"
         raise SceneError(name, [problem])
-    text, notes = _decoded(content, name)
+    text, notes = decode_text(content, name)
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
         raise SceneError(name, [f"line {line}: contains null bytes; expected a text file"])
@@ -212,35 +212,3 @@ def source_of_text(text: str, name: str, notes: tuple[str, ...] = ()) -> Source:
             problem = f"is longer than {MAX_LINE:,} characters; expected shorter lines"
             raise SceneError(name, [f"line {number} {problem}"])
     return Source(name, tuple(lines), notes)
-
-
-def _decoded(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
-    encoding = _utf16(content)
-    if encoding:
-        try:
-            return content.decode(encoding), ("read as UTF-16",)
-        except UnicodeDecodeError:
-            problem = "begins as UTF-16 text, but is not valid; expected a text file"
-            raise SceneError(name, [problem]) from None
-    try:
-        return content.decode("utf-8-sig"), ()
-    except UnicodeDecodeError as error:
-        try:
-            text = content.decode("cp1252")
-        except UnicodeDecodeError:
-            problem = f"is not text in UTF-8, UTF-16 or Windows-1252 (byte {error.start})"
-            raise SceneError(name, [f"{problem}; expected a text file"]) from None
-        return text, ("read as Windows-1252, because it is not UTF-8",)
-
-
-def _utf16(content: bytes) -> str:
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return "utf-16"
-    sample = content[:4096]
-    half = len(sample) // 2
-    if half < 2:
-        return ""
-    odd, even = sample[1::2].count(0) / half, sample[0::2].count(0) / half
-    if odd > _UTF16_SHARE and even < _UTF16_SHARE / 10:
-        return "utf-16-le"
-    return "utf-16-be" if even > _UTF16_SHARE and odd < _UTF16_SHARE / 10 else ""

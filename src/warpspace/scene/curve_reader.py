@@ -1,5 +1,6 @@
 """Readers of the curves of errors in scene files, and sums of curves."""
 
+import io
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +15,7 @@ from warpspace.machine.curves.registry import find_form, spell_forms
 from warpspace.machine.curves.simple import Constant, Directional, Harmonics, Poly, Ramp
 from warpspace.machine.curves.table import TableCurve, TwoArguments
 from warpspace.machine.definition import Gantry, default_across
-from warpspace.machine.errors import RUN_DIRECTIONS, UNKNOWN, TravelRun
+from warpspace.machine.errors import BACKWARD, FORWARD, UNKNOWN, TravelRun
 from warpspace.scene import text_files
 from warpspace.scene.schema import Problems
 from warpspace.units import Array
@@ -134,6 +135,7 @@ def _sampled(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> T
 
 GUIDES = "guides"  # key of the positioning errors of the two guides of a gantry
 RUN, DIRECTION = "run", "direction"  # columns that a file of runs may have
+SIGNS = {1: FORWARD, -1: BACKWARD}
 T = TypeVar("T")
 
 
@@ -149,34 +151,42 @@ def read_csv_runs(path: Path, column: str) -> tuple[TravelRun, ...]:
 
 def _read_csv(path: Path, read: Callable[[text_files.CsvRows], T]) -> T:
     source = str(path)
-    text_files.check_file(path, limits.MAX_CSV_BYTES, source)
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = text_files.CsvRows(file, source, limits.MAX_POINTS)
-            content = read(rows)
-            rows.check()
-            return content
-    except UnicodeDecodeError:
-        text_files.read_text(path, limits.MAX_CSV_BYTES)  # names the byte
-        raise
-    except OSError as error:
-        raise SceneError(source, [f"cannot be read: {error.strerror or error}"]) from None
+    text, _ = text_files.read_table_text(path, limits.MAX_CSV_BYTES)
+    rows = text_files.CsvRows(io.StringIO(text, newline=""), source, limits.MAX_POINTS)
+    content = read(rows)
+    rows.check()
+    return content
 
 
-def _column(rows: text_files.CsvRows, column: str) -> int:
+def _column(rows: text_files.CsvRows, column: str) -> tuple[int, float]:
+    """Find a column by its heading, with or without its unit, and the factor to µm or µrad."""
     columns = rows.header[1:]
-    if columns.count(column) == 1:
-        return columns.index(column) + 1
-    problem = "occurs twice" if column in columns else "not found"
-    hint = "" if column in columns else near_miss(column, columns)
+    headings = columns
+    if column not in columns:
+        plain = [text_files.plain_heading(name) for name in columns]
+        headings = [name.removesuffix(f"_{text_files.heading_unit(name)}") for name in plain]
+    if headings.count(column) == 1:
+        index = headings.index(column)
+        return index + 1, _factor(columns[index], ("um", "urad"))
+    problem = "occurs twice" if column in headings else "not found"
+    hint = "" if column in headings else near_miss(column, columns)
     raise SceneError(rows.source, [f"column {column!r} {problem}{hint}"])
+
+
+def _factor(heading: str, targets: tuple[str, str]) -> float:
+    """Return the factor from the unit of a heading to that of its quantity; 1 without a unit."""
+    unit = text_files.heading_unit(heading)
+    factors = [text_files.unit_factor(unit, target) for target in targets]
+    return next((factor for factor in factors if factor), 1.0)
 
 
 def _points(rows: text_files.CsvRows, column: str) -> list[tuple[float, float]]:
     points: list[tuple[float, float]] = []
-    index = _column(rows, column) if rows.header else 0
+    index, factor = _column(rows, column) if rows.header else (0, 1.0)
+    scale = _factor(rows.header[0], ("mm", "deg")) if rows.header else 1.0
     for line, row in rows:
-        position, value = (rows.number(row[at], line, limit=limits.MAX_ERROR) for at in (0, index))
+        position = scale * rows.number(row[0], line, limit=limits.MAX_ERROR / scale)
+        value = factor * rows.number(row[index], line, limit=limits.MAX_ERROR / factor)
         if points and position <= points[-1][0]:
             problem = f"position {position:g} after {points[-1][0]:g}"
             rows.note(f"line {line}: {problem}; expected ascending positions")
@@ -187,18 +197,20 @@ def _points(rows: text_files.CsvRows, column: str) -> list[tuple[float, float]]:
 
 
 def _runs(rows: text_files.CsvRows, column: str) -> tuple[TravelRun, ...]:
-    value_at = _column(rows, column)
+    value_at, factor = _column(rows, column)
+    scale = _factor(rows.header[0], ("mm", "deg"))
     run_at, direction_at = (
         rows.header.index(name) if name in rows.header else None for name in (RUN, DIRECTION)
     )
     readings: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for line, row in rows:
-        direction = UNKNOWN if direction_at is None else text_files.unguard_cell(row[direction_at])
-        if direction not in RUN_DIRECTIONS:
-            spelling = text_files.spell_value(direction)
+        text = "" if direction_at is None else text_files.unguard_cell(row[direction_at])
+        direction = SIGNS.get(text_files.DIRECTIONS.get(text.lower(), 0), UNKNOWN)
+        if text and direction == UNKNOWN:
+            spelling = text_files.spell_value(text)
             rows.note(f"line {line}: direction {spelling}; expected +, - or nothing")
-        position = rows.number(row[0], line, limit=limits.MAX_LENGTH_MM)
-        value = rows.number(row[value_at], line, limit=limits.MAX_ERROR)
+        position = scale * rows.number(row[0], line, limit=limits.MAX_LENGTH_MM / scale)
+        value = factor * rows.number(row[value_at], line, limit=limits.MAX_ERROR / factor)
         run = "" if run_at is None else text_files.unguard_cell(row[run_at])
         readings.setdefault((run, direction), []).append((position, value))
         if len(readings) > limits.MAX_RUNS:

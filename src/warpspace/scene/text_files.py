@@ -1,15 +1,18 @@
 """Readers of text files: TOML and CSV tables, with limits and messages."""
 
 import csv
+import io
 import math
 import os
 import re
 import sys
 import time as clock
 import tomllib
+import zipfile
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from datetime import date, time
+from importlib import import_module
 from itertools import chain
 from pathlib import Path
 from typing import TextIO
@@ -79,6 +82,82 @@ def read_text(path: Path, limit_bytes: int, source: str | None = None) -> str:
     except UnicodeDecodeError as error:
         text = f"is not UTF-8 text (byte {error.start}); expected a UTF-8 file"
         raise SceneError(source, [text]) from None
+
+
+def read_table_text(path: Path, limit_bytes: int) -> tuple[str, tuple[str, ...]]:
+    """Read a table as text, in any encoding, with notes on it."""
+    return decode_text(read_bytes(path, limit_bytes), str(path))
+
+
+SPREADSHEET = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
+"""First bytes of .xlsx and .ods, and of .xls."""
+_UTF16_SHARE = 0.3
+"""Smallest share of zero bytes at every other position of UTF-16 without a byte order mark."""
+
+
+def decode_text(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
+    """Decode text in UTF-8, UTF-16 or Windows-1252, or a spreadsheet, with notes."""
+    if content.startswith(SPREADSHEET):
+        return _sheet_text(content, name)
+    encoding = _utf16(content)
+    if encoding:
+        try:
+            return content.decode(encoding), ("read as UTF-16",)
+        except UnicodeDecodeError:
+            problem = "begins as UTF-16 text, but is not valid; expected a text file"
+            raise SceneError(name, [problem]) from None
+    try:
+        return content.decode("utf-8-sig"), ()
+    except UnicodeDecodeError as error:
+        try:
+            text = content.decode("cp1252")
+        except UnicodeDecodeError:
+            problem = f"is not text in UTF-8, UTF-16 or Windows-1252 (byte {error.start})"
+            raise SceneError(name, [f"{problem}; expected a text file"]) from None
+        return text, ("read as Windows-1252, because it is not UTF-8",)
+
+
+def _sheet_text(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
+    """Read the first sheet of a spreadsheet as a table with semicolons."""
+    expected = "a sheet that is saved as CSV"
+    try:
+        reader = import_module("python_calamine")
+    except ImportError:
+        problem = f"is a spreadsheet; expected the package python-calamine, or {expected}"
+        raise SceneError(name, [problem]) from None
+    if zipfile.is_zipfile(io.BytesIO(content)):
+        with zipfile.ZipFile(io.BytesIO(content)) as parts:
+            size = sum(part.file_size for part in parts.infolist())
+        if size > limits.MAX_CSV_BYTES:
+            limit = f"expected at most {limits.MAX_CSV_BYTES:,}"
+            raise SceneError(name, [f"is {size:,} bytes long when unpacked; {limit}"])
+    try:
+        workbook = reader.CalamineWorkbook.from_filelike(io.BytesIO(content))
+        rows = workbook.get_sheet_by_index(0).to_python(skip_empty_area=False)
+    except reader.CalamineError as error:
+        problem = f"is no readable spreadsheet ({one_line(str(error))}); expected {expected}"
+        raise SceneError(name, [problem]) from None
+    text = io.StringIO()
+    csv.writer(text, delimiter=MARKS[0], lineterminator="\n").writerows(
+        [int(cell) if isinstance(cell, float) and cell.is_integer() else cell for cell in row]
+        for row in rows
+    )
+    sheet, *ignored_sheets = map(repr, workbook.sheet_names)
+    ignored = f", ignored {', '.join(ignored_sheets)}" if ignored_sheets else ""
+    return text.getvalue(), (one_line(f"read sheet {sheet}{ignored}"),)
+
+
+def _utf16(content: bytes) -> str:
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    sample = content[:4096]
+    half = len(sample) // 2
+    if half < 2:
+        return ""
+    odd, even = sample[1::2].count(0) / half, sample[0::2].count(0) / half
+    if odd > _UTF16_SHARE and even < _UTF16_SHARE / 10:
+        return "utf-16-le"
+    return "utf-16-be" if even > _UTF16_SHARE and odd < _UTF16_SHARE / 10 else ""
 
 
 def read_bytes(path: Path, limit_bytes: int, source: str | None = None) -> bytes:
@@ -242,7 +321,7 @@ Row = tuple[int, list[str]]
 
 def parse_number(text: str) -> float:
     """Read a finite decimal number: no underscore, word or digit of other scripts."""
-    bare = text.strip()
+    bare = text.strip().replace("−", "-")
     value = float(bare) if _NUMBER.fullmatch(bare) else math.nan
     if not math.isfinite(value):
         raise ValueError(f"{text!r} is no number")
@@ -255,6 +334,76 @@ def parse_whole(text: str) -> int:
     if not value.is_integer():
         raise ValueError(f"{text!r} is no whole number")
     return int(value)
+
+
+LENGTH_UM: Mapping[str, float] = {
+    "um": 1.0,
+    "mm": 1e3,
+    "nm": 1e-3,
+    "m": 1e6,
+    **dict.fromkeys(("in", "inch"), 25_400.0),
+    "thou": 25.4,
+}
+ANGLE_URAD: Mapping[str, float] = {
+    "urad": 1.0,
+    "mrad": 1e3,
+    "rad": 1e6,
+    "arcsec": math.pi / 180.0 / 3600.0 * 1e6,
+    "deg": math.pi / 180.0 * 1e6,
+}
+POSITION_UNITS = {"mm", "m", "in", "inch", "deg", "rad"}
+"""Units of positions; a short heading such as x_mm is no deviation x_um."""
+DIRECTIONS: Mapping[str, int] = {
+    **dict.fromkeys(("+", "1", "+1", "↑", "forward", "forwards", "fwd", "positive"), 1),
+    **dict.fromkeys(("-", "−", "-1", "↓", "backward", "backwards", "reverse", "rev"), -1),
+    "negative": -1,
+}
+"""Directions of travel in tables, in lower case."""
+
+
+def unit_factor(unit: str, target: str) -> float | None:
+    """Return the factor from one unit to another; None for units of other quantities."""
+    for sizes in (LENGTH_UM, ANGLE_URAD):
+        if unit in sizes and target in sizes:
+            return sizes[unit] / sizes[target]
+    return None
+
+
+def match_column(name: str, headings: Sequence[str]) -> tuple[int, float] | None:
+    """Find a column such as ``deviation_um`` in any unit and case: its index and factor."""
+    if name in headings:
+        return headings.index(name), 1.0
+    stem, _, target = name.lower().rpartition("_")
+    for index, heading in enumerate(headings):
+        other, _, unit = heading.lower().rpartition("_")
+        factor = unit_factor(unit, target) if stem and other == stem else None
+        is_same_quantity = (
+            len(stem) > 1
+            or {unit, target} <= POSITION_UNITS
+            or not ({unit, target} & POSITION_UNITS)
+        )
+        if heading.lower() == name.lower() or (factor is not None and is_same_quantity):
+            return index, factor or 1.0
+    return None
+
+
+def heading_unit(heading: str) -> str:
+    """Return the unit in a heading such as ``EXX [um]`` or ``EXX_um``; empty without one."""
+    stem, _, unit = plain_heading(heading).rpartition("_")
+    return unit if stem and unit_factor(unit, unit) else ""
+
+
+def _has_units(cells: Sequence[str]) -> bool:
+    """Return true for the headings of a table: units, and no number."""
+    return any(map(heading_unit, cells)) and not any(map(_is_number, cells))
+
+
+def _is_number(text: str) -> bool:
+    try:
+        parse_number(text.replace(",", "."))
+    except ValueError:
+        return False
+    return True
 
 
 def plain_heading(text: str) -> str:
@@ -307,41 +456,116 @@ def _spell_cell(value: object) -> str:
     return '"' + text.replace('"', '""') + '"' if quoted else text
 
 
+MAX_PREAMBLE = 40  # lines above the header
+MIN_RUN_COLUMNS = 2
+DEVIATION = "deviation"
+"""Heading of readings in columns of runs that state no unit."""
+_RUN_HEADING = re.compile(r"(?:run\s*)?(\d+)\s*([^\d\s\[(]+)\s*(\[.*\]|\(.*\))?", re.IGNORECASE)
+
+
+def _mark(line: str) -> str:
+    bare = re.sub(r'"[^"]*("|$)', "", line)
+    return next((mark for mark in MARKS if mark in bare), ",")
+
+
+def _cells(line: str, mark: str) -> list[str]:
+    return [cell.strip().strip('"') for cell in line.split(mark)]
+
+
 class CsvRows:
     """The rows of a table, in bounded memory."""
 
     def __init__(self, file: TextIO, source: str, max_rows: int, *, unique: bool = False) -> None:
         self.source, self.problems = source, list[str]()
         self._file, self._max_rows, self._unique = file, max_rows, unique
-        self._number = self._since_row = 0
+        self._number = self._since_row = self._width = 0
         self._signs: dict[str, str] = {}
         self._repeated: list[str] = []
+        self._remarks: list[str] = []
         lines = self._lines()
         first = self._first(lines)
         named = _SEP.fullmatch(first)
         if named:
             self._since_row = 0
             first = self._first(lines)
-        bare = re.sub(r'"[^"]*("|$)', "", first)
-        self.mark = named[1] if named else next((mark for mark in MARKS if mark in bare), ",")
-        self._rows = self._split(chain([first] if first else [], lines))
+        first, lines = self._below_preamble(first, lines, named[1] if named else "")
+        self.mark = named[1] if named else _mark(first)
+        self._rows = self._split(lines)
         self.line, self.header = next(self._rows, (0, list[str]()))
         width = len(self.header)
         while self.header and not self.header[-1]:
             self.header.pop()
         self._trails = width > len(self.header) or self.mark != ","
+        self._merge_units()
+        self.runs = self._runs_in_columns()
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on identical rows."""
+        """Notes on identical rows, a preamble, and runs in columns."""
         if not self._repeated:
-            return ()
+            return tuple(self._remarks)
         count, rows = len(self._repeated), "rows" if len(self._repeated) > 1 else "row"
-        return (f"{count} {rows} identical to an earlier one, counted once: {self._repeated[0]}",)
+        repeated = f"{count} {rows} identical to an earlier one, counted once: {self._repeated[0]}"
+        return (repeated, *self._remarks)
+
+    def _below_preamble(
+        self, first: str, lines: Iterator[str], mark: str
+    ) -> tuple[str, Iterator[str]]:
+        """Find the first line of headings with units; without one, the first line is the header."""
+        number, ahead = self._number, list[tuple[int, str]]()
+        candidate = first
+        while candidate and len(ahead) < MAX_PREAMBLE:
+            if _has_units(_cells(candidate, mark or _mark(candidate))):
+                if ahead:
+                    self._remarks.append(f"ignored lines {number} … {self._number - 1}: a preamble")
+                return candidate, chain([candidate], lines)
+            ahead.append((self._number, candidate))
+            self._since_row = 0
+            candidate = next(lines, "")
+        ahead.append((self._number, candidate))
+        return first, chain(self._replay(ahead), lines)
+
+    def _replay(self, ahead: Sequence[tuple[int, str]]) -> Iterator[str]:
+        for self._number, line in ahead:
+            yield line
+
+    def _merge_units(self) -> None:
+        """Append the units of a row below the header to its headings."""
+        if _has_units(self.header) or not self.header:
+            return
+        row = next(self._rows, None)
+        if row is None:
+            return
+        units = [cell.strip("[]()").translate(_UNIT) for cell in row[1]]
+        if len(units) == len(self.header) and all(
+            unit_factor(unit, unit) for unit in units if unit
+        ):
+            pairs = zip(self.header, units, strict=True)
+            self.header = [f"{name} [{unit}]" if unit else name for name, unit in pairs]
+        else:
+            self._rows = chain([row], self._rows)
+
+    def _runs_in_columns(self) -> dict[int, tuple[str, str]]:
+        """Return run and direction of each column of readings; such columns become rows."""
+        runs: dict[int, tuple[str, str]] = {}
+        units = set[str]()
+        for index, heading in enumerate(self.header):
+            match = _RUN_HEADING.fullmatch(heading)
+            if match and match[2].strip().lower() in DIRECTIONS:
+                runs[index] = match[1], match[2].strip()
+                units.add((match[3] or "").strip("[]() "))
+        if len(runs) < MIN_RUN_COLUMNS or len(units) > 1:
+            return {}
+        self._remarks.append(f"{len(runs)} runs in columns")
+        self._width = len(self.header)
+        headings = [name for index, name in enumerate(self.header) if index not in runs]
+        unit = units.pop()
+        self.header = [*headings, "run", "direction", f"deviation [{unit}]" if unit else DEVIATION]
+        return runs
 
     def __iter__(self) -> Iterator[Row]:
         """Return the rows below the header that have as many cells."""
-        width = len(self.header)
+        width = self._width if self.runs else len(self.header)
         first_lines: dict[tuple[str, ...], int] = {}
         for count, (line, cells) in enumerate(self._rows):
             if count >= self._max_rows:
@@ -356,6 +580,11 @@ class CsvRows:
                 self.note(f"line {line}: {problem}{hint if commas else ''}")
             elif self._unique and first_lines.setdefault(tuple(cells), line) != line:
                 self._repeated.append(f"line {line} is line {first_lines[tuple(cells)]} again")
+            elif self.runs:
+                conditions = [cell for index, cell in enumerate(cells) if index not in self.runs]
+                for index, run in self.runs.items():
+                    if cells[index]:
+                        yield line, [*conditions, *run, cells[index]]
             else:
                 yield line, cells
 

@@ -1,6 +1,7 @@
 """Files that are not as they should be: read rightly, doubted or refused."""
 
 import codecs
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,13 @@ from warpspace.bench.base import find_test, run_test
 from warpspace.calibration.registry import parse_readings
 from warpspace.exceptions import SceneError
 from warpspace.formats import source
-from warpspace.formats.registry import ReadOptions, find_format, open_upload, read_errors
+from warpspace.formats.registry import (
+    ReadOptions,
+    find_format,
+    open_upload,
+    read_errors,
+    recognise,
+)
 from warpspace.formats.source import MAX_BYTES, source_of_bytes, source_of_text
 from warpspace.formats.to_scene import build_imported_scene
 from warpspace.kinematics.model import Loop
@@ -103,16 +110,35 @@ def test_sizes_of_hostile_files(content, said):
 @pytest.mark.parametrize(
     ("name", "content", "fragment"),
     [
-        ("a.xlsx", b"PK\x03\x04", "spreadsheet"),
-        ("a.csv", b"PK\x03\x04...", "spreadsheet"),
         ("a.rtx", b"anything", "laser interferometer"),
         ("a.pdf", b"%PDF-1.4", "PDF"),
         ("a.vcs", b"x", "SINUMERIK VCS"),
+        ("a.tab", b"TAB TEXT", "may be a HEIDENHAIN kinematics table"),
+        ("a.tab", b"24 -1448819\n0\n-32\n-38\n", "is a screw compensation table of Centroid"),
+        ("a.map", b"-10.0,-10.001\n0,0\n10,10.002\n", "pairs of numbers.*Mach3"),
+        ("a.txt", b"#\nND-280 MM\nAXIS X1 = 0\n", "digital readout"),
+        ("a.txt", b"%\nN10000 Q1 P0\nN10001 Q1 P-1\n", "pitch error data of FANUC"),
+        ("a.REN", b"Renishaw compensation\nCompensation type: Mean\n", "Renishaw"),
+        ("a.dat", b"unit = mm\n[X]\n0, 0.000, 0.010\n", "EasyRoute"),
+        ("a.cfg", b"#*# [bed_mesh default]\n#*# version = 1\n", "bed mesh of Klipper"),
     ],
 )
 def test_what_has_no_public_structure_is_refused_by_name(name, content, fragment):
     with pytest.raises(SceneError, match=f"{fragment}.*expected another file"):
-        open_upload(name, content)
+        recognise([open_upload(name, content)])
+
+
+@pytest.mark.parametrize("ending", [".tab", ".map", ".cmp", ".xlsx"])
+def test_no_file_is_identified_by_its_ending(ending):
+    source = open_upload(f"a{ending}", GOOD.encode())
+    assert recognise([source]).name == "csv"
+
+
+@pytest.mark.parametrize("content", [b"PK\x03\x04...", b"\xd0\xcf\x11\xe0"])
+def test_spreadsheets_need_their_reader(content, monkeypatch):
+    monkeypatch.setitem(sys.modules, "python_calamine", None)
+    with pytest.raises(SceneError, match="is a spreadsheet; expected the package python-calamine"):
+        open_upload("a.csv", content)
 
 
 def circle(angles, tmp_path, **options):

@@ -46,6 +46,11 @@ UNDERSTOOD = {
     "separators behind the rows": "X_mm;EXX_um\n-1,25;1,5;\n2;0,3;;\n",
     "separators behind all": "X_mm,EXX_um,\n-1.25,1.5,\n2,0.3,\n",
     "empty rows and remarks": "# by hand\n;;\nX_mm;EXX_um\n\n-1,25;1,5\n;;\n# end\n2;0,3\n",
+    "a preamble": '"Laser report"\n"Machine";"M1"\n\nX [mm];EXX [um]\n-1,25;1,5\n2;0,3\n',
+    "a row of units": "X;EXX\nmm;µm\n-1,25;1,5\n2;0,3\n",
+    "U+2212": "X [mm];EXX [um]\n−1,25;1,5\n2;0,3\n",
+    "other units": "X [m];EXX [nm]\n-0.00125;1500\n0.002;300\n",
+    "columns that are not needed": "X_mm,EXX_um,Pt,Timestamp\n-1.25,1.5,P1,2e13\n2,0.3,P2,2e13\n",
     "units in brackets": "X [mm],EXX [um]\n-1.25,1.5\n2,0.3\n",
     "units in parentheses": "X (mm);EXX (µm)\n-1,25;1,5\n2;0,3\n",
 }

@@ -22,9 +22,11 @@ from warpspace.formats.source import (
     format_number,
     quote,
     source_of_text,
+    unit_list,
 )
 from warpspace.machine.axes import PARAMETERS, is_axis_name, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
+from warpspace.scene import text_files
 from warpspace.scene.text_files import CsvRows, unguard_cell
 from warpspace.units import Array
 
@@ -110,12 +112,13 @@ def write(corrections: RequiredCorrections) -> Files:
 
 
 NAME = "csv"
-POSITION, ERROR, UNCERTAINTY = "position", "error", "uncertainty"
+POSITION, ERROR, UNCERTAINTY, IGNORED = "position", "error", "uncertainty", "ignored"
 DIRECTIONS: Mapping[str, int] = {
     **dict.fromkeys(("", "0"), measured.UNDIRECTED),
-    **dict.fromkeys(("+", "1", "+1", "forward"), measured.FORWARD),
-    **dict.fromkeys(("-", "-1", "−", "backward"), measured.BACKWARD),
+    **text_files.DIRECTIONS,
 }
+GENERIC = {"TARGET": POSITION, "POSITION": POSITION, "DEVIATION": ERROR}
+"""Headings that do not name the axis: of a laser interferometer, positioning."""
 _HEADING = re.compile(
     r"(?:(u)\s*\(\s*)?([A-Za-z0-9]+)\s*\)?\s*"
     r"(?:\[\s*([^\]]+?)\s*\]|\(\s*([^)]+?)\s*\)|_([A-Za-zµμ°/]+))?"
@@ -170,36 +173,49 @@ class _CsvTable:
 
 def recognise(head: str, name: str) -> bool:
     try:
-        header = source_of_text(head, name).rows(1).header
+        rows = source_of_text(head, name).rows(1)
     except SceneError:
         return False
-    matches = [match for match in map(_heading, header) if match]
+    matches = [match for match in map(_heading, rows.header) if match]
     has_unit = any(match[3] or match[4] or match[5] for match in matches)
-    return has_unit and any(match[2] in PARAMETERS for match in matches)
+    names = {match[2].upper() for match in matches}
+    return has_unit and bool(rows.runs or "DEVIATION" in names or names & PARAMETERS.keys())
 
 
 def _heading(text: str) -> re.Match[str] | None:
     return _HEADING.fullmatch(" ".join(text.split()))  # long blanks would cause backtracking
 
 
-def _columns(at: SourceLine, headings: Sequence[str]) -> tuple[_CsvColumn, ...]:
-    columns = [_column(at, heading) for heading in headings]
-    keys = [(column.role, column.name) for column in columns]
+def _columns(at: SourceLine, rows: CsvRows, options: ReadOptions) -> tuple[_CsvColumn, ...]:
+    headings = [
+        f"{heading} [um]" if rows.runs and heading == text_files.DEVIATION else heading
+        for heading in rows.header
+    ]
+    columns = [_column(at, heading, options) for heading in headings]
+    keys = [(column.role, column.name) for column in columns if column.role != IGNORED]
     repeated = next((name for role, name in keys if keys.count((role, name)) > 1), None)
     if repeated:
         at.refuse(f"column {repeated} occurs twice", "it once")
     return tuple(columns)
 
 
-def _column(at: SourceLine, heading: str) -> _CsvColumn:
+def _column(at: SourceLine, heading: str, options: ReadOptions) -> _CsvColumn:
     lower = heading.strip().lower()
     if lower in (RUN, DIRECTION):
         return _CsvColumn(lower, lower)
     matched = _heading(heading)
+    if _is_ignored(heading, matched):
+        return _CsvColumn(IGNORED, heading)
     if matched is None:
         expected = "headings such as X [mm], EXX [um], u(EXX) [um], run, direction"
         at.refuse(f"column {quote(heading)}", expected)
     uncertain, name = bool(matched[1]), matched[2].upper()
+    if name in GENERIC and not uncertain:
+        if not options.axis:
+            at.refuse(f"column {quote(heading)} does not state its axis", "--axis X")
+        axis = options.axis_named(options.axis, at)
+        along = "ABCXYZXYZ"["ABCXYZUVW".index(axis[0])]
+        name = axis if GENERIC[name] == POSITION else f"E{along}{axis}"
     unit = (matched[3] or matched[4] or matched[5] or "").strip()
     if name in PARAMETERS:
         factors = URAD_PER if parameter(name).is_rotation else UM_PER
@@ -212,36 +228,52 @@ def _column(at: SourceLine, heading: str) -> _CsvColumn:
         expected = f"an axis, an error, u(error), run or direction{hint}"
         at.refuse(f"column {quote(heading)}", expected)
     if not unit:
-        units = ", ".join(name for name in factors if name.isascii())
+        units = unit_list(factors)
         at.refuse(f"column {name} has no unit", f"{name} [unit], with one of {units}")
     return _CsvColumn(role, name, at.unit(unit, factors, name), unit)
 
 
+def _is_ignored(heading: str, matched: re.Match[str] | None) -> bool:
+    """Return true for a column that is not needed: without a unit, and unlike an error or axis."""
+    name = matched[2].upper() if matched else ""
+    is_known = name in PARAMETERS or name in GENERIC or is_axis_name(name)
+    is_similar = bool(re.fullmatch(r"E[A-Z0-9]{2,3}", name)) or (matched and matched[1])
+    return not (is_known or is_similar or text_files.heading_unit(heading))
+
+
 def read(sources: Sequence[Source], options: ReadOptions) -> measured.ImportedErrors:
-    readings = measured.merge([_read_one(source) for source in sources])
+    readings = measured.merge([_read_one(source, options) for source in sources])
     return measured.errors_of_readings(readings, options.machine)
 
 
-def _read_one(source: Source) -> measured.ImportedErrors:
+def _read_one(source: Source, options: ReadOptions) -> measured.ImportedErrors:
     csv_rows = source.rows(MAX_POINTS)
     if not csv_rows.header:
         source.refuse("has no header", "one such as X [mm],EXX [um]")
     head = source.at(csv_rows.line)
-    columns = _columns(head, csv_rows.header)
+    columns = _columns(head, csv_rows, options)
     if not any(column.role == ERROR for column in columns):
         head.refuse("has no column of an error", "one such as EXX [um]")
     rows: list[_Row] = []
     for number, cells in csv_rows:
         at = source.at(number)
-        pairs = zip(columns, cells, strict=True)
-        row = {(column.role, column.name): column.value(x, at, csv_rows) for column, x in pairs}
+        row = {
+            (column.role, column.name): column.value(cell, at, csv_rows)
+            for column, cell in zip(columns, cells, strict=True)
+            if column.role != IGNORED
+        }
         rows.append((at, row))
     csv_rows.check()
     if not rows:
         head.refuse("has no rows below its header", "at least one")
     imported = _errors(_CsvTable(source, head, columns, tuple(rows)))
     units = tuple(dict.fromkeys(column.unit for column in columns if column.unit))
+    ignored = ", ".join(column.name for column in columns if column.role == IGNORED)
     notes = (*source.notes, *csv_rows.notes, *imported.notes)
+    if csv_rows.runs and text_files.DEVIATION in csv_rows.header:
+        notes += ("runs without a unit: read as µm",)
+    if ignored:
+        notes += (f"ignored columns: {ignored}",)
     return replace(imported, units=units, notes=notes)
 
 

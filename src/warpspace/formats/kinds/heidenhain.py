@@ -100,11 +100,15 @@ def _lookup_axis(source: Source, axes: dict[str, list[str]], options: ReadOption
     return options.axis_of_file(source, "its .CMA file with it, or --axis X")
 
 
-def _lines(source: Source, along: str, options: ReadOptions) -> list[AxisTable]:
+def _lines(source: Source, along: str, options: ReadOptions, notes: list[str]) -> list[AxisTable]:
     rows = _rows(source)
     if not rows:
         source.refuse("has no compensation points", "at least one")
-    columns = [name for name in rows[0][1] if name not in (NUMBER, POSITION, BACKLASH)]
+    columns = [
+        name
+        for name in rows[0][1]
+        if name not in (NUMBER, POSITION, BACKLASH) and any(cells[name] for _, cells in rows)
+    ]
     if POSITION not in rows[0][1] or not columns:
         source.refuse(f"expected the columns {POSITION} and one for each corrected axis")
     places = np.array([at.position(cells[POSITION], POSITION) for at, cells in rows])
@@ -117,8 +121,9 @@ def _lines(source: Source, along: str, options: ReadOptions) -> list[AxisTable]:
     factor = options.factor(ERROR)
     lines: list[AxisTable] = []
     for column in columns:
-        if all(not cells[column] for _, cells in rows):
-            continue
+        empty = [at.line for at, cells in rows if not cells[column]]
+        if empty:
+            notes.append(f"{source.base}: {column} is empty in line {empty[0]}: interpolated")
         target = options.axis_named(column, rows[0][0])
         points = [
             (q, at.position(cells[column], column))
@@ -146,12 +151,13 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     if not tables:
         sources[0].refuse("names tables", "these .COM files with it")
     terms: list[AxisTable] = []
+    notes: list[str] = []
     for source in tables:
         along = _lookup_axis(source, axes, options)
         if any(term.source == along for term in terms):
             source.refuse(f"is a second table over {along}", "one active table per axis")
-        terms += _lines(source, along, options)
-    return Tables(tuple(terms), (options.sign_statement(SIGN), TRAVEL))
+        terms += _lines(source, along, options, notes)
+    return Tables(tuple(terms), (options.sign_statement(SIGN), TRAVEL), tuple(notes))
 
 
 def write(required: RequiredCorrections) -> Files:

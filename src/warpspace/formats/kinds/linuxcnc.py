@@ -17,11 +17,18 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
+from warpspace.formats.measured import ImportedErrors
 from warpspace.formats.registry import Files, Format, ReadOptions, describe, has_pattern
 from warpspace.formats.source import Source, format_comment, format_number, quote
-from warpspace.formats.terms import Affine, AxisTable, Tables
+from warpspace.formats.terms import Affine, AxisTable, Tables, errors_from_tables
+from warpspace.kinematics.chain import loop_error, nominal_point
+from warpspace.kinematics.model import Loop, Model
+from warpspace.kinematics.relative_motion import axis_frames
 from warpspace.machine.axes import TravelDirection, is_linear
+from warpspace.machine.definition import Machine, build_machine
+from warpspace.units import Array
 
+COMP = "linuxcnc-comp"
 MAX_ROWS = 256
 DIGITS = 6
 JOINTS = "XYZABCUVW"
@@ -39,13 +46,15 @@ Joint = tuple[str, str, float]  # axis, type of the table, mm or degrees per mac
 
 
 def _is_comp(head: str, name: str) -> bool:
-    if name.lower().endswith(".comp") or re.search(r"^\s*COMP_FILE\s*=", head, re.MULTILINE):
+    if re.search(r"^\s*COMP_FILE\s*=", head, re.MULTILINE):
         return True
     rows = [line for line in head.splitlines() if line.strip()]
+    if name.lower().endswith(".comp"):
+        return any(map(_ROW.match, rows))
     return len(rows) > 1 and all(map(_ROW.match, rows))
 
 
-def _read_ini(source: Source) -> dict[str, Joint]:
+def _read_ini(source: Source, notes: list[str]) -> dict[str, Joint]:
     """Read the joints of an INI file by the name of their table."""
     joints: dict[str, Joint] = {}
     coordinates = _KINEMATICS.search(source.text)
@@ -66,6 +75,8 @@ def _read_ini(source: Source) -> dict[str, Joint]:
             file = setting.rsplit("/", 1)[-1]
         elif key == "COMP_FILE_TYPE":
             kind = f"type-{at.integer(setting, key, 0, 1)}"
+        elif key == "BACKLASH" and axis:
+            notes.append(f"{source.base}: line {at.line}: ignored {bare}: not in a COMP_FILE")
     return joints
 
 
@@ -98,47 +109,114 @@ def _rows(source: Source, per_unit: float, notes: list[str]) -> np.ndarray:
     return np.array(rows)
 
 
-def _kind(rows: np.ndarray, stated: str) -> tuple[str, tuple[str, ...]]:
+def _kind(source: Source, rows: np.ndarray, stated: str) -> tuple[str, tuple[str, ...]]:
+    span = max(np.ptp(rows[:, 0]), abs(rows[:, 0]).max(), 1e-9)
+    follows = np.abs(rows[:, 1:] - rows[:, :1]).max() < NEAR * span
+    stays = np.abs(rows[:, 1:]).max() <= NEAR * span
+    if (stated == OFFSETS and follows and not stays) or (
+        stated == POSITIONS and stays and not follows
+    ):
+        other = POSITIONS if stated == OFFSETS else OFFSETS
+        contents = "actual positions" if stated == OFFSETS else "corrections"
+        source.refuse(f"looks like {contents}, but is {stated}", f"{stated} (is it {other}?)")
     if stated:
         return stated, ()
-    span = max(np.ptp(rows[:, 0]), abs(rows[:, 0]).max(), 1e-9)
-    positions = np.abs(rows[:, 1:] - rows[:, :1]).max() < NEAR * span
-    kind = POSITIONS if positions and np.abs(rows[:, 1]).max() > NEAR * span else OFFSETS
+    kind = POSITIONS if follows and np.abs(rows[:, 1]).max() > NEAR * span else OFFSETS
     description = "actual positions (type 0)" if kind == POSITIONS else "offsets (type 1)"
     return kind, (f"second and third column: {description}; --variant selects the other type",)
 
 
-def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
+def _combined(tables: Sequence[AxisTable], weights: Sequence[float]) -> AxisTable:
+    at = np.unique(np.concatenate([table.positions for table in tables]))
+    forward, backward = (
+        sum(weight * table.at(at, way) for weight, table in zip(weights, tables, strict=True))
+        for way in (1, -1)
+    )
+    upwards, downwards = (tuple(np.asarray(moves).tolist()) for moves in (forward, backward))
+    axis = tables[0].source
+    reverse = () if upwards == downwards else downwards
+    return AxisTable(axis, axis, tuple(at.tolist()), upwards, backward=reverse)
+
+
+def _joint_tables(
+    sources: Sequence[Source], options: ReadOptions
+) -> tuple[dict[str, list[AxisTable]], Tables]:
+    """Read the tables by axis, in the order of the joints; two are the guides of a gantry."""
     joints: dict[str, Joint] = {}
-    tables: list[Source] = []
+    files: list[Source] = []
+    notes: list[str] = []
     for source in sources:
         if re.search(r"^[ \t]*+COMP_FILE", source.text, re.MULTILINE):
-            joints |= _read_ini(source)
+            joints |= _read_ini(source, notes)
         else:
-            tables.append(source)
-    terms: list[AxisTable] = []
+            files.append(source)
+    names = [source.base for source in files]
+    notes += [
+        f"{name} of {joint[0]}: not among the files"
+        for name, joint in joints.items()
+        if name not in names
+    ]
+    files.sort(key=lambda source: [*joints, source.base].index(source.base))
+    tables: dict[str, list[AxisTable]] = {}
     inches = any(size != 1.0 for _, _, size in joints.values())
     assumed: list[str] = [f"machine units {'inches' if inches else 'mm'} and degrees"]
-    notes: list[str] = []
-    for source in tables:
+    for source in files:
         axis, kind, per_unit = joints.get(source.base, ("", "", 1.0))
+        has_pair = [joint[0] for joint in joints.values()].count(axis) == 2
         axis = (
             options.axis_named(axis, source)
             if axis
             else options.axis_of_file(source, "--axis X, or its INI file")
         )
-        if any(term.source == axis for term in terms):
+        if axis in tables and not has_pair:
             source.refuse(f"is a second table of {axis}", "one per joint, the limit of LinuxCNC")
+        if has_pair and (options.machine is None or axis not in options.machine.gantries):
+            source.refuse(
+                f"belongs to one of two joints of {axis}, the guides of a gantry",
+                f"--machine with [machine.gantry] {axis} = {{ span_mm = … }}, their distance",
+            )
         rows = _rows(source, per_unit, notes)
-        kind, assumptions = _kind(rows, options.variant or kind)
+        kind, assumptions = _kind(source, rows, options.variant or kind)
         assumed += assumptions
         trims = rows[:, :1] - rows[:, 1:] if kind == POSITIONS else rows[:, 1:]
         nominal, forward, reverse = (tuple(column.tolist()) for column in (rows[:, 0], *trims.T))
         backward = () if forward == reverse else reverse
-        terms.append(AxisTable(axis, axis, nominal, forward, backward=backward))
-    if not terms:
+        table = AxisTable(axis, axis, nominal, forward, backward=backward)
+        tables.setdefault(axis, []).append(table)
+    if not tables:
         sources[0].refuse("names files", "the files of its COMP_FILE lines with it")
-    return Tables(tuple(terms), tuple(dict.fromkeys(assumed)), tuple(notes))
+    letters = [axis for axis, _, _ in joints.values()]
+    for axis, parts in tables.items():
+        if len(parts) < letters.count(axis):
+            sources[0].refuse(f"has two joints of {axis}", "the files of both")
+    assumed += [
+        f"gantry {axis}: the joint with the lower number is the first guide"
+        for axis, parts in tables.items()
+        if len(parts) > 1
+    ]
+    means = tuple(
+        parts[0] if len(parts) == 1 else _combined(parts, (0.5, 0.5)) for parts in tables.values()
+    )
+    return tables, Tables(means, tuple(dict.fromkeys(assumed)), tuple(notes))
+
+
+def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
+    return _joint_tables(sources, options)[1]
+
+
+def _read_comp_errors(sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
+    by_axis, tables = _joint_tables(sources, options)
+    machine = options.machine
+    imported = errors_from_tables(tables, COMP, sources[0], machine)
+    for axis, parts in by_axis.items():
+        if len(parts) == 1 or machine is None:
+            continue
+        gantry = machine.gantries[axis]
+        difference = Tables((_combined(parts, (-1.0, 1.0)),))
+        lead = errors_from_tables(difference, COMP, sources[0], machine).series
+        turns = (error.scaled(gantry.rotation_key, gantry.rotation_weight) for error in lead)
+        imported = replace(imported, series=(*imported.series, *turns))
+    return imported
 
 
 def _write_comp(corrections: RequiredCorrections) -> Files:
@@ -164,7 +242,11 @@ def _write_comp(corrections: RequiredCorrections) -> Files:
     return {"": "\n".join(lines) + "\n", **files}
 
 
+MATRIX = "linuxcnc-matrix"
 MATRIX_DIGITS = 9
+HALF_MM = 100.0  # half of the lines along which the exact chain is evaluated
+ITERATIONS = 3  # the remainder shrinks by the size of the angles
+MIN_SLOPE = 1e-5  # µm/mm; smaller slopes are omitted
 MAX_COEFFICIENT = 0.1  # deviation of a coefficient from the identity: 0.1 rad or 10 %
 _SETP = re.compile(r"setp\s+matrixkins\.C_([xyz])([xyz])\s+(\S+)", re.IGNORECASE)
 
@@ -178,7 +260,7 @@ def _read_matrix(sources: Sequence[Source], options: ReadOptions) -> Tables:
     coefficients: dict[tuple[str, str], float] = {}
     for source in sources:
         for at, bare in source.scan("#"):
-            if "matrixkins.C_" not in bare:
+            if not re.search(r"\bC_[a-z]", bare, re.IGNORECASE):
                 continue
             matched = _SETP.fullmatch(bare)
             if matched is None:
@@ -198,6 +280,54 @@ def _read_matrix(sources: Sequence[Source], options: ReadOptions) -> Tables:
     return Tables((Affine(AXES, matrix),), (), (), ("mm/mm",))
 
 
+def _read_matrix_errors(sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
+    """Read the errors that the matrix corrects: the joints are C·p, so that p errs by C⁻¹·p − p."""
+    tables = _read_matrix(sources, options)
+    identity = np.eye(len(AXES))
+    inverses = [
+        Affine(AXES, tuple(map(tuple, (identity - np.linalg.inv(identity + term.matrix)).tolist())))
+        for term in tables.terms
+        if isinstance(term, Affine)
+    ]
+    return _exact_errors(
+        errors_from_tables(
+            replace(tables, terms=tuple(inverses)), MATRIX, sources[0], options.machine
+        ),
+        options.machine or build_machine("wFXYZt"),
+    )
+
+
+def _exact_errors(imported: ImportedErrors, machine: Machine) -> ImportedErrors:
+    """Add slopes of translations, so that the exact chain has the error of the first order."""
+    model, rotations = Model(machine), {**imported.constants}
+    slopes = {key: curve["poly"][1] for key, curve in imported.curves.items()}
+    position = np.repeat(np.eye(len(AXES)), 2, axis=0) * np.tile([HALF_MM, -HALF_MM], 3)[:, None]
+    at = {axis: np.zeros(len(position)) for axis in machine.axes}
+    at |= {axis: position[:, index] for index, axis in enumerate(AXES)}
+    point_mm = nominal_point(model, Loop.TOOL, at)
+
+    def error_um(*, exact: bool) -> Array:
+        errors = rotations | {key: slope * at[key[2:]] for key, slope in slopes.items()}
+        arrays = {key: np.asarray(error) for key, error in errors.items()}
+        return loop_error(model, Loop.RELATIVE, at, arrays, point_mm, exact=exact)[0]
+
+    nominal_um = error_um(exact=False)
+    zero = dict.fromkeys(machine.axes, np.zeros(()))
+    for _ in range(ITERATIONS):
+        remainder_um = nominal_um - error_um(exact=True)
+        changes = (remainder_um[::2] - remainder_um[1::2]) / (2.0 * HALF_MM)
+        for axis, change in zip(AXES, changes, strict=True):
+            frames, sign = axis_frames(model, zero, axis)
+            shares = sign * np.asarray(frames.after)[:3, :3].T @ change
+            for letter, share in zip(AXES, shares.tolist(), strict=True):
+                key = f"E{letter}{axis}"
+                slopes[key] = slopes.get(key, 0.0) + share
+    curves = {
+        key: {"poly": [0.0, slope]} for key, slope in slopes.items() if abs(slope) > MIN_SLOPE
+    }
+    return replace(imported, curves=curves)
+
+
 def _write_matrix(corrections: RequiredCorrections) -> Files:
     allowed = [(row, column) for row in AXES for column in AXES]
     coefficients = corrections.linear_fit(allowed)
@@ -211,11 +341,12 @@ def _write_matrix(corrections: RequiredCorrections) -> Files:
 
 FORMATS = (
     Format(
-        **describe("linuxcnc-comp"), recognise=_is_comp, tables=_read_comp, write=_write_comp,
+        **describe(COMP), recognise=_is_comp, read=_read_comp_errors, tables=_read_comp,
+        write=_write_comp,
         most_points=MAX_ROWS, variants=(POSITIONS, OFFSETS),
     ),
     Format(
-        **describe("linuxcnc-matrix"), recognise=has_pattern(r"matrixkins\.C_"),
-        tables=_read_matrix, write=_write_matrix,
+        **describe(MATRIX), recognise=has_pattern(r"matrixkins\.C_"),
+        read=_read_matrix_errors, tables=_read_matrix, write=_write_matrix,
     ),
 )  # fmt: skip

@@ -24,7 +24,7 @@ from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, describe, has_pattern
 from warpspace.formats.source import Source, SourceLine, format_comment, format_number, quote
 from warpspace.formats.terms import AxisTable, Product, Tables, Term
-from warpspace.machine.axes import TravelDirection
+from warpspace.machine.axes import TravelDirection, is_linear
 from warpspace.units import Array
 
 ENC, CEC = "AA_ENC_COMP", "AN_CEC"
@@ -45,8 +45,9 @@ MAX_INDEX = 100_000
 MAX_PRODUCTS = 3  # pairs of tables for one axis over two others
 MIN_PRODUCT_MM = 1e-5  # smaller products of tables are omitted
 MIN_TABLE_MM = 1e-7  # smaller tables are omitted
-SWITCHES = {DIRECTION: (-1, 1), FACTOR: (0, MAX_TABLES), IS_MODULO: (0, 1)}
+SWITCHES = {DIRECTION: (-1, 1), FACTOR: (0, MAX_TABLES), IS_MODULO: (-1, 1)}
 """Integer settings of a table, with their limits."""
+CONSTANTS = {"TRUE": "1", "FALSE": "0"}
 SETTINGS = {ENC: (*RANGE, IS_MODULO), CEC: (*AXES, *RANGE, *SWITCHES)}
 INDICES = {
     ENC: ("[encoder, point, axis]", "[encoder, axis]"),
@@ -55,8 +56,8 @@ INDICES = {
 """Indices of a value and of a setting."""
 CorrectionsByAxes = Mapping[tuple[str, ...], Array]
 """Corrections by the corrected axis and the axes that they depend on."""
-_ASSIGNMENT = re.compile(r"\$([A-Z_]+)\s*\[([^\]]*)\]\s*=\s*(.+)")
-_QUIET = re.compile(r"(%.*|CHANDATA\(\d+\)|M17|M30|M02|N\d+)", re.IGNORECASE)
+_ASSIGNMENT = re.compile(r"\$([A-Z_]+)\s*\[([^\]]*)\]\s*(=?)\s*([^\s=].*)")
+_QUIET = re.compile(r"(%.*|CHANDATA\(\d+\)|M0?[0-2]|M17|M30|RET|N\d+)", re.IGNORECASE)
 
 
 @dataclass
@@ -87,6 +88,8 @@ class AssignmentTable:
             self.at.refuse(f"{problem} ({steps:.4g})", "equal steps from start to end")
         if round(steps) > MAX_INDEX:
             self.at.refuse(f"{label}: {round(steps):,} steps", f"at most {MAX_INDEX:,}")
+        if self.switches.get(IS_MODULO) == -1 and not is_linear(axes[0]):
+            self.at.refuse(f"{label}: ${prefix}_{IS_MODULO} is -1", "0 or 1 for a rotary axis")
         last = round(steps)
         missing = next((index for index in range(last + 1) if index not in self.values), None)
         if missing is not None:
@@ -99,7 +102,7 @@ class AssignmentTable:
             *axes,
             tuple((start + step * np.arange(last + 1, dtype=np.float64)).tolist()),
             tuple(factor * self.values[index] for index in range(last + 1)),
-            is_modulo=bool(self.switches.get(IS_MODULO)),
+            is_modulo=self.switches.get(IS_MODULO) == 1,
             direction=self.switches.get("DIRECTION", 0),
         )
 
@@ -108,28 +111,37 @@ def _assigns(name: str) -> Callable[[str, str], bool]:
     return has_pattern(rf"^\s*(?:N\d+\s+)?\${name}[A-Z_]*\s*\[")
 
 
-def _assignments(source: Source, prefix: str) -> Iterator[tuple[SourceLine, str, list[str], str]]:
+def _assignments(
+    source: Source, prefix: str, notes: list[str]
+) -> Iterator[tuple[SourceLine, str, list[str], str]]:
     """Yield line, setting (empty for a value), indices and value of each assignment."""
     names = (prefix, *(f"{prefix}_{setting}" for setting in SETTINGS[prefix]))
+    without_sign = list[int]()
     is_empty = True
     for at, text in source.scan(";"):
-        bare = re.sub(r"^N\d+\s+", "", text)
-        if _QUIET.fullmatch(bare):
-            continue
-        matched = _ASSIGNMENT.fullmatch(bare)
-        if matched is None:
-            at.refuse(at.quoted, "$VARIABLE[index, …] = value")
-        name, inner, number = matched.groups()
-        if name not in names:
-            at.refuse(f"variable ${name}", f"one of {', '.join(f'${known}' for known in names)}")
-        parts = [part.strip() for part in re.split(r"[,.]", inner)]
-        expected = INDICES[prefix][name != prefix]
-        if len(parts) != expected.count(",") + 1:
-            at.refuse(f"${name}[{', '.join(parts)}]", expected)
-        is_empty = False
-        yield at, name.removeprefix(prefix).removeprefix("_"), parts, number.strip()
+        for bare in re.split(r"\s+(?=\$)", re.sub(r"^N\d+\s+", "", text)):
+            if _QUIET.fullmatch(bare):
+                continue
+            matched = _ASSIGNMENT.fullmatch(bare)
+            if matched is None:
+                at.refuse(quote(bare), "$VARIABLE[index, …] = value")
+            name, inner, equals, number = matched.groups()
+            if name not in names:
+                at.refuse(f"variable ${name}", f"one of {', '.join(f'${n}' for n in names)}")
+            parts = [part.strip() for part in re.split(r"[,.]", inner)]
+            expected = INDICES[prefix][name != prefix]
+            if len(parts) != expected.count(",") + 1:
+                at.refuse(f"${name}[{', '.join(parts)}]", expected)
+            is_empty = False
+            if not equals:
+                without_sign.append(at.line)
+            yield at, name.removeprefix(prefix).removeprefix("_"), parts, number.strip()
     if is_empty:
         source.refuse(f"has no ${prefix}", "tables of this variable")
+    if without_sign:
+        notes.append(
+            f"{len(without_sign)} assignments without =, the first in line {without_sign[0]}"
+        )
 
 
 def _index(text: str, at: SourceLine) -> int:
@@ -162,22 +174,27 @@ def _archive(name: str, corrections: RequiredCorrections, sign: str, body: Seque
     return {"": "\n".join([*head, *body, "M17"]) + "\n"}
 
 
-def _read(source: Source, prefix: str) -> dict[tuple[int, str], AssignmentTable]:
+def _read(source: Source, prefix: str, notes: list[str]) -> dict[tuple[int, str], AssignmentTable]:
     """Read the tables of a variable by the first index and, of encoders, the axis."""
     tables: dict[tuple[int, str], AssignmentTable] = {}
-    for at, setting, parts, text in _assignments(source, prefix):
+    for at, setting, parts, text in _assignments(source, prefix, notes):
         name = f"${prefix}_{setting}" if setting else f"${prefix}"
         number = _index(parts[0], at)
         if prefix == CEC and number >= MAX_TABLES:
             at.refuse(f"table {number}", f"at most {MAX_TABLES - 1}")
         key = number, _axis_name(parts[-1], at) if prefix == ENC else ""
         table = tables.setdefault(key, AssignmentTable(at))
+        if setting in {**table.axes, **table.numbers, **table.switches}:
+            at.refuse(f"{name}[{', '.join(parts)}] is repeated", "it once")
         if setting in AXES:
             table.axes[setting] = _axis_name(text, at)
         elif setting in RANGE:
             table.numbers[setting] = at.number(text, name)
         elif setting:
-            table.switches[setting] = at.integer(text, name, *SWITCHES[setting])
+            number_text = CONSTANTS.get(text.upper(), text) if setting == IS_MODULO else text
+            table.switches[setting] = at.integer(number_text, name, *SWITCHES[setting])
+            if setting == IS_MODULO and table.switches[setting] == -1:
+                notes.append(f"line {at.line}: {name} is -1: the table does not repeat")
         else:
             index = _index(parts[1], at)
             if index in table.values:
@@ -191,7 +208,7 @@ def _read_enc(sources: Sequence[Source], options: ReadOptions) -> Tables:
     terms: list[AxisTable] = []
     notes: list[str] = []
     for source in sources:
-        for (encoder, name), table in _read(source, ENC).items():
+        for (encoder, name), table in _read(source, ENC, notes).items():
             axis = options.axis_named(name, table.at)
             label = f"table of {name}"
             if any(term.source == axis for term in terms):
@@ -220,9 +237,10 @@ def _write_enc(corrections: RequiredCorrections) -> Files:
 
 def _read_cec(sources: Sequence[Source], options: ReadOptions) -> Tables:
     terms: list[Term] = []
+    notes: list[str] = []
     factor = options.factor(ERROR)
     for source in sources:
-        tables = {index: table for (index, _), table in _read(source, CEC).items()}
+        tables = {index: table for (index, _), table in _read(source, CEC, notes).items()}
         lines: dict[int, AxisTable] = {}
         for index, table in tables.items():
             label = f"table {index}"
@@ -241,7 +259,7 @@ def _read_cec(sources: Sequence[Source], options: ReadOptions) -> Tables:
                 problem = f"table {index} is multiplied by table number {other + 1}"
                 table.at.refuse(problem, "the file to contain it")
             terms.append(Product(lines[index], lines[other], factor))
-    return Tables(tuple(terms), (options.sign_statement(CEC_SIGN), UNITS))
+    return Tables(tuple(terms), (options.sign_statement(CEC_SIGN), UNITS), tuple(notes))
 
 
 def _write_cec(corrections: RequiredCorrections) -> Files:

@@ -1,4 +1,4 @@
-"""Skew factors of printer firmware: Klipper and Marlin evaluate them alike.
+"""Skew factors of printer firmware: Klipper and Marlin evaluate them alike, RepRapFirmware adds.
 
 Klipper, klippy/extras/skew_correction.py, a port of Marlin's planner: of the diagonals AC and BD
 and the side AD of a printed part, with side = √(2·AC² + 2·BD² − 4·AD²) / 2, the factor is
@@ -83,7 +83,17 @@ def fitted_factors(corrections: RequiredCorrections) -> dict[str, float]:
 
 
 MIN_OFFSET_MM = 1.0  # between probe and nozzle: with less, a twist is not estimable
-PROBES = ("probe", "bltouch", "beacon", "cartographer", "smart_effector")
+TWIST = "axis_twist_compensation"
+TWISTS = {
+    "z_compensations": ("x", "EAX", "y_offset", 1.0),
+    "zy_compensations": ("y", "EBY", "x_offset", -1.0),
+}
+"""Axis, roll, lever arm of the probe and its sign (rotation × lever arm) of height errors."""
+_TWIST_KEY = re.compile(
+    r"zy?_compensations|((compensation|calibrate)_)?(start|end)_[xy]|(calibrate_)?[xy]|speed"
+    r"|horizontal_move_z"
+)
+_SAVED_KEY = re.compile(r"(xy|xz|yz)_skew")
 _SET = re.compile(r"\b(XY|XZ|YZ)=([^\s]+)")
 _PROFILE = re.compile(r"\[skew_correction\s++([^\]]+)\]")
 _LOAD = re.compile(r"\bSKEW_PROFILE\s+LOAD=\"?([^\s\"]+)")
@@ -134,7 +144,10 @@ def _set_skew(at: SourceLine, command: str, factors: dict[str, float], notes: li
     if re.search(r"CLEAR\s*=\s*1", command):
         factors.clear()
         return
-    for plane, value in _SET.findall(command):
+    parameters = re.split("[;#]", command.partition("SET_SKEW")[2])[0]
+    if _SET.sub("", parameters).strip():
+        at.refuse(at.quoted, "SET_SKEW with XY=, XZ=, YZ= or CLEAR=1")
+    for plane, value in _SET.findall(parameters):
         parts = value.split(",")
         if len(parts) != 3:
             at.refuse(f"{plane}={value}", "three lengths AC,BD,AD in mm")
@@ -170,40 +183,75 @@ def _klipper_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
 
 def _twist(source: Source, options: ReadOptions) -> ImportedErrors | None:
     sections = _sections(source)
-    twist = sections.get("axis_twist_compensation", {})
-    if "z_compensations" not in twist:
+    twist = sections.get(TWIST, {})
+    assumed: list[str] = []
+    notes: list[str] = []
+    series: list[ErrorSeries] = []
+    for heights_key, (axis, key, offset_key, sign) in TWISTS.items():
+        if heights_key not in twist:
+            continue
+        at, text = twist[heights_key]
+        options.axis_named(axis.upper(), at)
+        heights = [at.number(part, heights_key) for part in text.split(",")]
+        ends = [_twist_end(twist, f"{end}_{axis}", at) for end in ("start", "end")]
+        if len(heights) < 2 or ends[1] <= ends[0]:
+            problem = f"{len(heights)} {heights_key} from {ends[0]:g} to {ends[1]:g}"
+            at.refuse(problem, "two or more along a range")
+        probe, place, offset = _probe_offset(sections, offset_key, at)
+        if abs(offset) < MIN_OFFSET_MM:
+            expected = f"{MIN_OFFSET_MM:g} mm or more to compute the twist"
+            if len(TWISTS.keys() & twist.keys()) == 1:
+                place.refuse(f"{offset_key} {offset:g} mm", expected)
+            notes.append(f"ignored {heights_key}: {offset_key} {offset:g} mm; expected {expected}")
+            continue
+        places = np.linspace(ends[0], ends[1], len(heights))
+        angles = sign * np.array(heights) / offset * URAD_PER_RAD
+        series.append(ErrorSeries.undirected(key, places, angles))
+        assumed.append(
+            f"the height errors of [{probe}], {offset_key} {offset:g} mm from the nozzle, are due"
+            f" to roll of {axis.upper()}; their mean is not in the file"
+        )
+    if not series:
         return None
-    at, text = twist["z_compensations"]
-    heights = [at.number(part, "z_compensations") for part in text.split(",")]
-    ends: list[float] = []
-    for key in ("start_x", "end_x"):
-        names = (f"compensation_{key}", f"calibrate_{key}", key)
-        name = next((name for name in names if name in twist), None)
-        if name is None:
-            at.refuse("[axis_twist_compensation] is incomplete", f"calibrate_{key}")
-        place, text = twist[name]
-        ends.append(place.number(text, name))
-    if len(heights) < 2 or ends[1] <= ends[0]:
-        problem = f"{len(heights)} z_compensations from {ends[0]:g} to {ends[1]:g}"
-        at.refuse(problem, "two or more along a range")
-    probe = next((name for name in PROBES if "y_offset" in sections.get(name, {})), None)
-    if probe is None:
-        expected = "y_offset in [probe], needed to compute the twist"
-        at.refuse("[axis_twist_compensation] without a probe", expected)
-    place, text = sections[probe]["y_offset"]
-    offset = place.number(text, "y_offset")
-    if abs(offset) < MIN_OFFSET_MM:
-        expected = f"{MIN_OFFSET_MM:g} mm or more to compute the twist"
-        place.refuse(f"y_offset {offset:g} mm", expected)
-    options.axis_named("X", at)
-    places = np.linspace(ends[0], ends[1], len(heights))
-    series = ErrorSeries.undirected("EAX", places, np.array(heights) / offset * URAD_PER_RAD)
-    assumption = (
-        f"the height errors of the probe, {offset:g} mm behind the nozzle, are due to roll of X;"
-        " their mean is not in the file"
+    readings = ImportedErrors(
+        "klipper", tuple(series), units=("mm",), assumed=tuple(assumed), notes=tuple(notes)
     )
-    readings = ImportedErrors("klipper", (series,), units=("mm",), assumed=(assumption,))
     return errors_of_readings(readings, options.machine)
+
+
+def _twist_end(twist: Section, name: str, at: SourceLine) -> float:
+    names = (f"compensation_{name}", f"calibrate_{name}", name)
+    present = next((key for key in names if key in twist), None)
+    if present is None:
+        at.refuse(f"[{TWIST}] is incomplete", f"calibrate_{name}")
+    place, text = twist[present]
+    return place.number(text, present)
+
+
+def _probe_offset(
+    sections: Mapping[str, Section], key: str, at: SourceLine
+) -> tuple[str, SourceLine, float]:
+    """Find the offset of the probe: of whichever section has one."""
+    probes = [name for name, section in sections.items() if key in section]
+    if len(probes) != 1:
+        problem = f"[{TWIST}] with {', '.join(probes)}" if probes else f"[{TWIST}] without a probe"
+        at.refuse(problem, f"{key} in one section such as [probe], needed to compute the twist")
+    place, text = sections[probes[0]][key]
+    return probes[0], place, place.number(text, key)
+
+
+def _unread(source: Source) -> tuple[str, ...]:
+    """Return notes on the contents of sections that are not read."""
+    sections = _sections(source)
+    notes = [
+        f"{source.base}: ignored [bed_mesh]: the shape of the bed, not an error of an axis"
+        for _ in sections.keys() & {"bed_mesh"}
+    ]
+    for name, expression in ((TWIST, _TWIST_KEY), ("skew_correction", _SAVED_KEY)):
+        unread = [key for key in sections.get(name, {}) if not expression.fullmatch(key)]
+        if unread:
+            notes.append(f"{source.base}: ignored in [{name}]: {', '.join(unread)}")
+    return tuple(notes)
 
 
 def _read_klipper(sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
@@ -215,6 +263,7 @@ def _read_klipper(sources: Sequence[Source], options: ReadOptions) -> ImportedEr
         if not twist or _factors(source, options, []):
             tables = _klipper_tables([source], options)
             parts.append(errors_from_tables(tables, "klipper", source, options.machine))
+        parts[-1] = replace(parts[-1], notes=(*parts[-1].notes, *_unread(source)))
     return merge(parts)
 
 
@@ -233,12 +282,16 @@ LETTERS = {"I": "XY", "S": "XY", "J": "XZ", "K": "YZ"}
 _WORD = re.compile(r"([A-Z])\s*([^A-Z\s]*)")
 _DEFINE = re.compile(r"#\s*define\s+(XY|XZ|YZ)_(DIAG_AC|DIAG_BD|SIDE_AD|SKEW_FACTOR)\s+(\S+)")
 _SWITCH = re.compile(r"#\s*define\s+(SKEW_CORRECTION(?:_FOR_Z)?)\b")
+_ECHO = re.compile(r"^(Recv:\s*)?echo:\s*")
+_REPORTED = re.compile(r"\b(XY|XZ|YZ):\s*([^\s,]+)")
 _COMMENT = re.compile(r"/\*.*?(?:\*/|$)|//[^\n]*", re.DOTALL)
 
 
 def _is_marlin(head: str, name: str) -> bool:
-    match = re.search(r"^\s*M852\b|SKEW_CORRECTION", head, re.MULTILINE)
-    return match is not None or name.endswith("Configuration.h")
+    match = re.search(
+        r"^\W*(Recv:|echo:|\s)*M852\b|SKEW_CORRECTION|Skew Factor:", head, re.MULTILINE
+    )
+    return match is not None or (name.endswith("Configuration.h") and "#define" in head)
 
 
 def _marlin_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
@@ -272,18 +325,33 @@ def _read_marlin(source: Source, factors: Settings, defined: dict[str, Settings]
     """Read the factors of M852 and the lengths by plane; return the switches that are defined."""
     switches: set[str] = set()
     text = _COMMENT.sub(lambda comment: "\n" * comment[0].count("\n"), source.text)
-    for at, bare in replace(source, lines=tuple(text.split("\n"))).scan(";"):
+    for at, line in replace(source, lines=tuple(text.split("\n"))).scan(";"):
+        bare = _ECHO.sub("", line)
         switch, define = _SWITCH.match(bare), _DEFINE.match(bare)
         if switch:
             switches.add(switch[1])
         elif define:
             number = at.number(define[3].rstrip("f"), define[2])
-            defined.setdefault(define[1], {})[define[2]] = (at, number)
+            settings = defined.setdefault(define[1], {})
+            if define[2] in settings:
+                at.refuse(f"{define[1]}_{define[2]} is defined twice", "it once")
+            settings[define[2]] = (at, number)
+        elif bare.startswith("Skew Factor:"):
+            if _REPORTED.sub("", bare.partition(":")[2]).strip():
+                at.refuse(at.quoted, "XY: number XZ: number YZ: number")
+            for plane, number in _REPORTED.findall(bare):
+                factors[plane] = (at, at.number(number, plane))
         elif re.match(r"M852\b", bare):
-            for letter, number in _WORD.findall(bare[4:]):
-                if letter not in LETTERS:
+            if _WORD.sub("", bare[4:]).strip():
+                at.refuse(at.quoted, "M852 with I, J, K or S")
+            parameters = _WORD.findall(bare[4:])
+            planes = [LETTERS.get(letter, "") for letter, _ in parameters]
+            for plane, (letter, number) in zip(planes, parameters, strict=True):
+                if not plane:
                     at.refuse(f"M852 {letter}", "I, J, K or S")
-                factors[LETTERS[letter]] = (at, at.number(number, f"M852 {letter}"))
+                if planes.count(plane) > 1:
+                    at.refuse(f"M852 sets {plane} twice", "it once")
+                factors[plane] = (at, at.number(number, f"M852 {letter}"))
     return switches
 
 
@@ -291,7 +359,11 @@ def _defined_factor(
     plane: str, settings: Settings, defined: Mapping[str, Settings], notes: list[str]
 ) -> tuple[SourceLine, float]:
     if "SKEW_FACTOR" in settings:
-        return settings["SKEW_FACTOR"]
+        at, factor = settings["SKEW_FACTOR"]
+        lengths = ", ".join(f"{plane}_{name}" for name in settings if name != "SKEW_FACTOR")
+        if lengths:
+            notes.append(f"{plane}_SKEW_FACTOR {factor:g} overrides {lengths}, as in Marlin")
+        return at, factor
     side = settings.get("SIDE_AD")
     if side is None and plane == "XZ":
         side = defined.get("XY", {}).get("SIDE_AD")
@@ -314,6 +386,44 @@ def _write_marlin(corrections: RequiredCorrections) -> Files:
     return {"": f"{head}M852 {' '.join(parameters)}\n"}
 
 
+_M556 = re.compile(r"M556\b(.*)", re.IGNORECASE)
+TANGENTS = {"X": ("X", "Y"), "Y": ("Y", "Z"), "Z": ("X", "Z")}
+"""Corrected axis and axis of the position of each letter of M556."""
+
+
+def _read_m556(sources: Sequence[Source], options: ReadOptions) -> Tables:
+    """Read M556 of RepRapFirmware, Move::AxisTransform: X += tan XY·Y + tan XZ·Z."""
+    matrix = np.zeros((3, 3))
+    is_empty = True
+    for source in sources:
+        for at, bare in source.scan(";"):
+            command = _M556.fullmatch(bare)
+            parameters = _WORD.findall(command[1].upper()) if command else []
+            numbers = {letter: at.number(text, f"M556 {letter}") for letter, text in parameters}
+            if not numbers:
+                continue
+            is_unknown = command is not None and _WORD.sub("", command[1].upper()).strip()
+            if is_unknown or len(numbers) < len(parameters) or not numbers.keys() <= {*"SXYZP"}:
+                at.refuse(at.quoted, "S, X, Y, Z and P, each once")
+            length = numbers.pop("S", 0.0)
+            if length <= 0.0:
+                at.refuse(
+                    f"{at.quoted} without a length", "S above 0, the length of the part in mm"
+                )
+            is_reversed = bool(at.integer(str(numbers.pop("P", 0.0)), "M556 P", 0, 1))
+            for letter, deviation in numbers.items():
+                row, column = TANGENTS[letter][:: -1 if is_reversed and letter == "X" else 1]
+                if abs(deviation) > MAX_FACTOR * length:
+                    at.refuse(f"{letter}{deviation:g} over S{length:g}", "a deviation below S")
+                for axis in (row, column):
+                    options.axis_named(axis, at)
+                matrix[AXES.index(row), AXES.index(column)] = deviation / length
+            is_empty = False
+    if is_empty:
+        sources[0].refuse("has no axis compensation", "M556 S… X… Y… Z…")
+    return Tables((Affine(AXES, tuple(map(tuple, matrix.tolist()))),), (), (), ("mm",))
+
+
 KLIPPER = Format(
     **describe("klipper"),
     limits=f"three factors: {', '.join(PLANES)}",
@@ -325,4 +435,9 @@ KLIPPER = Format(
 MARLIN = Format(
     **describe("marlin"), recognise=_is_marlin, tables=_marlin_tables, write=_write_marlin
 )
-FORMATS = (KLIPPER, MARLIN)
+REPRAP = Format(
+    **describe("reprapfirmware"),
+    recognise=has_pattern(r"(?i)^\s*M556\b"),
+    tables=_read_m556,
+)
+FORMATS = (KLIPPER, MARLIN, REPRAP)
