@@ -56,7 +56,7 @@ INDICES = {
 """Indices of a value and of a setting."""
 CorrectionsByAxes = Mapping[tuple[str, ...], Array]
 """Corrections by the corrected axis and the axes that they depend on."""
-_ASSIGNMENT = re.compile(r"\$([A-Z_]+)\s*\[([^\]]*)\]\s*(=?)\s*([^\s=].*)")
+_ASSIGNMENT = re.compile(r"\$([A-Z_]+)\s*+\[([^\]]*)\]\s*+(=?)\s*+([^\s=].*)")
 _QUIET = re.compile(r"(%.*|CHANDATA\(\d+\)|M0?[0-2]|M17|M30|RET|N\d+)", re.IGNORECASE)
 
 
@@ -119,7 +119,7 @@ def _assignments(
     without_sign = list[int]()
     is_empty = True
     for at, text in source.scan(";"):
-        for bare in re.split(r"\s+(?=\$)", re.sub(r"^N\d+\s+", "", text)):
+        for bare in re.split(r"(?<!\s)\s++(?=\$)", re.sub(r"^N\d+\s+", "", text)):
             if _QUIET.fullmatch(bare):
                 continue
             matched = _ASSIGNMENT.fullmatch(bare)

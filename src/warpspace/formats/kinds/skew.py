@@ -282,14 +282,16 @@ LETTERS = {"I": "XY", "S": "XY", "J": "XZ", "K": "YZ"}
 _WORD = re.compile(r"([A-Z])\s*([^A-Z\s]*)")
 _DEFINE = re.compile(r"#\s*define\s+(XY|XZ|YZ)_(DIAG_AC|DIAG_BD|SIDE_AD|SKEW_FACTOR)\s+(\S+)")
 _SWITCH = re.compile(r"#\s*define\s+(SKEW_CORRECTION(?:_FOR_Z)?)\b")
-_ECHO = re.compile(r"^(Recv:\s*)?echo:\s*")
+_ECHO = re.compile(r"^(Recv:\s*+)?echo:\s*+")
 _REPORTED = re.compile(r"\b(XY|XZ|YZ):\s*([^\s,]+)")
 _COMMENT = re.compile(r"/\*.*?(?:\*/|$)|//[^\n]*", re.DOTALL)
 
 
 def _is_marlin(head: str, name: str) -> bool:
     match = re.search(
-        r"^\W*(Recv:|echo:|\s)*M852\b|SKEW_CORRECTION|Skew Factor:", head, re.MULTILINE
+        r"^(?:> ?)?(?:Recv:\s*+)?(?:echo:\s*+)?M852\b|SKEW_CORRECTION|Skew Factor:",
+        head,
+        re.MULTILINE,
     )
     return match is not None or (name.endswith("Configuration.h") and "#define" in head)
 
