@@ -77,6 +77,7 @@ MAX_URDF_TRIANGLES = 1_000_000  # of all shapes together
 MAX_PROGRAM_BYTES = 50 * 1024 * 1024
 MAX_PATH_POINTS = 5_000_000  # samples of a path
 MAX_WORD = 99_999_999  # of a word that names no position, as controls with eight digits have it
+MAX_CALLS = 10  # subprograms within each other
 MAX_CYCLE = 10_000  # pecks of a hole
 MAX_CYCLE_MOVES = 40_000  # of one line: holes times the moves of each
 MAX_TURNS = 1_000  # of one arc

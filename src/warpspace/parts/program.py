@@ -5,9 +5,10 @@ Geometry only: no forces, heat, wear or servo.
 
 The corrected program moves the tip to its nominal place less the error of the machine there: linear
 axes follow, rotary words are unchanged. Words are absolute (G90), arcs become lines, cycles the
-moves that they stand for. Other words, comments and the lines of G28 and G53 are unchanged. An axis
-is written from the line on that names it, since its initial position is unknown. The same holds
-after G28 and G53, another work offset or mode, and for Z after another tool or length.
+moves that they stand for. Other words, comments and the lines of G28, G30, G53, G10 and G52 are
+unchanged. An axis is written from the line on that names it, since its initial position is unknown.
+The same holds after G28, G30 and G53, another work offset or mode, and for Z after another tool or
+length.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -128,8 +129,15 @@ def trace_program(program: ParsedProgram, chord_mm: float = CHORD_MM) -> ToolPat
     move = np.repeat(np.arange(len(count)), count)
     share = (np.arange(len(move)) - (np.cumsum(count) - count)[move] + 1.0) / count[move]
     at, tip, error = along_moves(program, move, share)
-    same_tool = np.diff(program.length_mm[move], prepend=program.length_mm[move[:1]]) == 0.0
-    step = np.diff(tip, axis=0, prepend=tip[:1]) * same_tool[:, None]
+    step = np.diff(tip, axis=0, prepend=tip[:1])
+    step[0] = 0.0
+    # moves that do not begin where the sample before stands: after another length, mode or jump
+    begins = np.append(True, np.diff(move) > 0) & (np.append(0, np.diff(move)) > 1)
+    begins[1:] |= np.diff(program.length_mm[move]) != 0.0
+    (first,) = np.nonzero(begins)
+    if len(first):
+        start = along_moves(program, move[first], np.zeros(len(first)))[1]
+        step[first] = tip[first] - start
     outside = ~within_travel(program.scene.machine, at)
     path = ToolPath(program.line[move], move, at, tip, error, outside, step, None)
     return replace(path, uncertainty=_path_uncertainty(program, path))
@@ -233,10 +241,10 @@ class PathPoint:
 class Program(interpreter.ControlSettings, Analysis):
     """Evaluate the errors along the path of a program on SCENE.
 
-    G-code: G0 to G3 in three planes, G17 to G21, G28, G43, G43.4, G49, G53 to G59, G80 to G83, G90,
-    G91. Subprograms and variables are refused by line: the path ends before them. Errors are those
-    of the tool against the workpiece, in the workpiece frame, actual − nominal. Geometry only: no
-    forces, heat, wear or servo.
+    G-code: motion in three planes, offsets, lengths, tool centre point, rotation in the plane,
+    drilling cycles, subprograms. The path ends before a word that is neither executed nor known to
+    move no axis; it is reported with its line. Errors are those of the tool against the workpiece,
+    in the workpiece frame, actual − nominal. Geometry only: no forces, heat, wear or servo.
     """
 
     name = "program"
@@ -324,23 +332,52 @@ class ProgramResult(Result):
         return {"": "\n".join([*map(one_line, correct_program(self.analysis, self.program)), ""])}
 
     def json_fields(self) -> dict[str, Any]:
-        refused = [{"line": line, "word": word} for line, word in self.program.refused.items()]
+        program = self.program
+        refused = [
+            {"line": line, "word": word, "reason": program.reasons[line].removeprefix("; ")}
+            for line, word in program.refused.items()
+        ]
+        remarks = {
+            "dialect": program.dialect or None,
+            "skipped": [{"line": line, "words": words} for words, line in program.skipped.items()],
+            "remarks": [*self.assumptions(), *self.caveats()],
+        }
         line = {"line": to_json(self.line)} if self.line else {}
-        return {"blocks": self.program.blocks, "refused": refused, **to_json(self), **line}
+        return {"blocks": program.blocks, "refused": refused, **remarks, **to_json(self), **line}
+
+    def assumptions(self) -> Iterator[str]:
+        """List how the program was read."""
+        if self.program.dialect:
+            yield f"Dialect: {self.program.signs or self.program.dialect}"
+        if self.program.skipped:
+            yield f"Ignored because of --skip: {', '.join(self.program.skipped)}"
+        if self.program.integer_word:
+            word, line = self.program.integer_word
+            numbers = "Numbers without a decimal point are mm or degrees"
+            yield f"{numbers}: {word} (line {line}); --least-increment for other units"
 
     def caveats(self) -> Iterator[str]:
-        refused = [f"line {line} {word}" for line, word in self.program.refused.items()]
+        program = self.program
+        refused = [f"line {line} {word}" for line, word in program.refused.items()]
         if refused:
-            listed = ", ".join(refused[:MAX_LISTED])
-            yield f"refused: {listed}; the path ends before the first of them"
-        unknown = [f"{word} (line {line})" for word, line in self.program.unknown.items()]
-        if unknown:
-            yield f"not followed: {', '.join(unknown[:MAX_LISTED])}"
+            listed, first = ", ".join(refused[:MAX_LISTED]), next(iter(program.reasons.values()))
+            yield f"refused: {listed}; the path ends before the first of them{first}"
+        for listing, title in (
+            (program.skipped, "ignored because of --skip"), (program.remarks, "remarks")
+        ):  # fmt: skip
+            entries = [f"{word} (line {line})" for word, line in listing.items()]
+            if entries:
+                yield f"{title}: {', '.join(entries[:MAX_LISTED])}"
+        if program.unused:
+            yield f"unused: --offset {', '.join(program.unused)}"
+        if program.signs and not program.dialect:
+            yield f"words of several dialects: {program.signs}; --dialect selects one"
         if self.outside:
             yield f"{self.outside} of {len(self.path.line)} points are beyond the travel"
 
     def blocks(self) -> Iterator[Block]:
         yield f"{self.program.scene.title} · {self.program.blocks} blocks, {self.length_mm:.1f} mm"
+        yield from (f"  {assumption}" for assumption in self.assumptions())
         yield "  Geometry only: no forces, heat, wear or servo; errors in the workpiece frame"
         heads = number_columns(("mean", "RMS", "P95", "max"), ".2f", "µm")
         names = {"error": self.deviation, "along the path": self.along, "across it": self.across}
@@ -407,9 +444,9 @@ def _corrected(program: ParsedProgram, count: Integers) -> tuple[Integers, Array
 
 def correct_program(analysis: Program, program: ParsedProgram) -> Iterator[str]:
     """Write the lines of a program with which this machine cuts the nominal path of another."""
-    unused = {line: word for word, line in program.unknown.items() if " with G" in word}
-    for line, word in {**program.refused, **unused}.items():
-        raise OptionError(f"line {line}: {word} is not followed; expected a program that is")
+    for line, word in {**program.refused, **program.uncorrectable}.items():
+        reason = program.reasons.get(line, "; expected no such word in a program to be corrected")
+        raise OptionError(f"line {line}: {word}{reason}")
     row, places = corrected_places(program, analysis.within_um / 1e3)
     scene, lines, line_of = program.scene, [*analysis.lines()], program.line[row]
     state = interpreter.Interpreter(scene, analysis, analysis.file or "")
@@ -417,22 +454,23 @@ def correct_program(analysis: Program, program: ParsedProgram) -> Iterator[str]:
     missing = ", ".join(linear - state.index.keys())
     if missing:
         raise OptionError(f"no word moves axis {missing}; expected one axis of each letter")
-    named, mode, header, number = set[str](), ("", False), _header(scene, analysis), 0
+    named, mode, number = set[str](), ("", False), 0
+    header = _header(scene, analysis, program.dialect)
     for number, line in enumerate(state.run(lines), start=1):
         codes, letters = {*state.codes}, state.words.keys() & state.index.keys()
         if codes or state.words:
             yield from header  # once
         if mode != (state.system, state.tcp):
             mode, named = (state.system, state.tcp), set()
-        if codes & {"G28", "G53"}:
+        if state.once in {"G28", "G30", "G53", "G10", "G52"}:
             named -= letters or named
-        elif codes & {"M6", "G43", "G43.4", "G49"}:
+        elif codes & {"M6", "G56", *interpreter.COMPENSATING} or "D" in state.words:
             named -= {"Z"}
         places_here = np.arange(*np.searchsorted(line_of, [number, number + 1]))
         moving = places_here[program.kind[row[places_here]] != interpreter.STAND]
-        if codes & {"G4", "G28", "G53"} or not (letters or len(moving)):
+        if state.once or not (letters or len(moving)):
             block = [word for key, word in state.tokens if key not in _MODES]
-            is_relative = "G28" in codes and not state.absolute
+            is_relative = state.once in {"G28", "G30"} and not state.absolute
             if is_relative:
                 block.insert(0, "G91")
             yield state.skip + " ".join(block) if state.tokens else line.rstrip()
@@ -449,13 +487,21 @@ def correct_program(analysis: Program, program: ParsedProgram) -> Iterator[str]:
     yield from (line.rstrip() for line in lines[number:])
 
 
-def _header(scene: Scene, analysis: Program) -> Iterator[str]:
+def _header(scene: Scene, analysis: Program, dialect: str) -> Iterator[str]:
     digest = sha256(scene_to_toml(scene).encode()).hexdigest()[:12]
     title = f"{scene.title[:80]}, chain {scene.machine.chain}, errors {digest}"
-    yield format_comment("(", f"corrected for {title}", ")")
-    setup = "".join(f", {name}={value:g}" for name, value in analysis.offset)
-    yield f"(TCP {analysis.tcp}, length {analysis.length_mm:g} mm{setup})"
-    yield f"(within {analysis.within_um:g} um between points; geometry only)"
+    setup = [f"{name}={value:g}" for name, value in analysis.offset]
+    setup += [f"dialect {dialect}"] * bool(dialect)
+    setup += [f"ignored words {' '.join(analysis.skip)}"] * bool(analysis.skip)
+    if analysis.least_increment:
+        setup.append(f"least increment {analysis.least_increment:g}")
+    marks = (";", "") if dialect == "sinumerik" else ("(", ")")
+    for text in (
+        f"corrected for {title}",
+        ", ".join([f"TCP {analysis.tcp}", f"length {analysis.length_mm:g} mm", *setup]),
+        f"within {analysis.within_um:g} um between points; geometry only",
+    ):
+        yield format_comment(marks[0], text, marks[1])
     yield "G90"
 
 
@@ -465,7 +511,13 @@ def _blocks(
     """Write the current line of a control as straight blocks to places, [n, a]."""
     number = [word for key, word in state.tokens if key == "N"]
     replaced = _MODES | _LAST | {"N", "G0", "G1", *state.index}
-    replaced |= {*("KLPQR" if state.cycle else ""), *("F" if state.inverse_time else "")}
+    replaced |= {
+        "CR",
+        ",R",
+        ",C",
+        *("IJKLPQR" if state.cycle else ""),
+        *("F" if state.inverse_time else ""),
+    }
     replaced |= {*("IJKPR" if state.motion in {"G2", "G3"} else "")}
     other_words = [word for key, word in state.tokens if key not in replaced]
     last = [code for code in state.codes if code in _LAST]

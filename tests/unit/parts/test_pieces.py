@@ -42,7 +42,7 @@ def test_pieces_hold_together(name: str, tmp_path: Path):
     scene = parse_scene(f"title = 'plain'\n{PLAIN}", "plain")
     read = read_program(scene, (tmp_path / "a.ngc").read_text().splitlines(), ControlSettings())
     assert not read.refused
-    assert not read.unknown
+    assert not read.remarks
     path = trace_program(read)
     low = path.tip_mm[path.tip_mm[:, 2] <= mesh.vertices_mm[:, 2].max()][:, :2]
     widest = np.abs(mesh.vertices_mm[:, :2]).max()

@@ -1,0 +1,213 @@
+"""Words of programs from the shop: executed, known to move no axis, or the end of the path."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import warpspace
+from warpspace.analysis.description import ignore_progress
+from warpspace.cli.main import cli
+from warpspace.exceptions import SceneError
+from warpspace.parts.program import Program, ProgramResult
+
+MILL, PRINTER = "machine_gantry_mill", "machine_printer_3d"
+BC, AC = "machine_trunnion_bc", "machine_trunnion_ac"
+
+
+def run(text: str, scene: str = MILL, **options: Any) -> ProgramResult:
+    program = Program(file="p.nc", text=text, **options)
+    return program.run(warpspace.load_scene(scene), ignore_progress)
+
+
+START = "G21 G90 G17\nG0 X0 Y0 Z0\nG1 X10 F100\n"
+
+
+@pytest.mark.parametrize(
+    ("block", "word"),
+    [
+        ("TRANS X100 Y50", "TRANS"), ("AROT Z30", "AROT"), ("G101 X0", "G101"),
+        ("G7.1 C50", "G7.1"), ("M777 X500 Y500", "M777"), ("G68.1 R45", "G68.1"),
+        ("G71 I30 J0 K30 L4", "G71"), ("G50.1 X0", "G50.1"), ("G50 X3", "G50"),
+        ("G254", "G254"), ("CYCLE800(1,\"TC1\",0)", "CYCLE800"), ("MCALL CYCLE83(1)", "MCALL"),
+        ("G1 X50 ,B5.", ",B5."), ("G1 X50 A5", "A5"), ("G58 X10 Y20", "G58"), ("R1=5", "R1=5"),
+        ("G83 Z-5. R1.", "G83"), ("G83 Z-5. R1. Q0.", "G83"), ("G83 Z-5 R1 Q1 K0.2", "K0.2"),
+        ("ROT RPL=45", "ROT"), ("M98 P7", "M98 P7"), ("G41 D1 X9", "G41"), ("X=R1", "X=R1"),
+    ],
+)  # fmt: skip
+def test_the_path_ends_before_a_word_that_is_not_known(tmp_path: Path, block: str, word: str):
+    result = run(f"{START}{block}\nG1 X500 Y500")
+    assert next(iter(result.program.refused.values())) == word
+    assert result.length_mm == pytest.approx(10.0)
+    (tmp_path / "a.nc").write_text(f"{START}{block}\nG1 X500 Y500")
+    files = [str(tmp_path / "a.nc"), "-o", str(tmp_path / "b.nc")]
+    outcome = CliRunner().invoke(cli, ["program", MILL, *files])
+    assert outcome.exit_code
+    assert not (tmp_path / "b.nc").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("TRANS X5 Y5\nG0 X1", r"line 1: TRANS; expected"), ("M8\nM30", "moves no axis"),
+        ("BEGIN PGM 11 MM\n1 L X5 F9", "line 1: BEGIN PGM; HEIDENHAIN Klartext"),
+        ("%\n(2D (2))\nG0 X5", r"line 2: \(2D; expected the end of the comment"),
+    ],
+)  # fmt: skip
+def test_a_program_without_motion_is_an_error(text: str, problem: str):
+    with pytest.raises(SceneError, match=problem):
+        run(text)
+
+
+def test_words_to_skip_are_ignored_and_stated():
+    text = f"{START}TRANS X100 Y50\nG101 X0 M8\nX20 A5 M777\nG0 M0777 X30"
+    result = run(text, skip=("TRANS", "G101", "M777", "A5"))
+    assert result.program.skipped == {
+        "TRANS X100 Y50": 4,
+        "G101 X0": 5,
+        "A5 M777": 6,
+        "M777 X30": 7,
+    }
+    assert (result.length_mm, result.program.refused) == (pytest.approx(20.0), {})
+    assert {"line": 4, "words": "TRANS X100 Y50"} in result.as_json()["skipped"]
+    assert any("TRANS X100 Y50 (line 4)" in caveat for caveat in result.caveats())
+    assert any("TRANS X100 Y50" in str(block) for block in result.blocks())
+
+
+@pytest.mark.parametrize(
+    ("text", "length"),
+    [
+        # parameters of M words; an extruder; words of slicers
+        (("M201 X500 Y500 Z100 E500\nM92 X80 Y80 Z400 E99\nG28 W\nM115 U3.9.1\nG29\nG80\n"
+         "G92 E0.0\nM117 Layer 1/20 X9\nG1 Z2.0 F3000\nX10.1 Y20 Z0.28\nX10.1Y90.E0.5"), 94.4715),
+        ("M82\nG28\nG0F3600X90.1Y89.2Z0.3\nG1F1800X100.2Y89.2E0.5\nX101Y90E0.7", 138.0176),
+    ],
+)  # fmt: skip
+def test_a_printer_executes_the_file_of_a_slicer(text: str, length: float):
+    result = run(text, PRINTER)
+    assert (result.program.refused, result.program.dialect) == ({}, "printer")
+    assert result.length_mm == pytest.approx(length, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "offset", "length"),
+    [
+        ("G0 X0 Y0 Z0\nG43 H1 Z-200\nG1 X10", {"H1": 100.0}, 110.0),
+        # headers, NULs, titles
+        ("\0\0%\nO1001\nG0X0Y0Z10.\nG1X50.F300\nM30\n%\0", {}, 50.0),
+        ("% PART 1234-5\nO<FLANGE>(A)\nG0 X0 Y0 Z10.\nG1 X50. F300\nM30", {}, 50.0),
+        ("<FLANGE_OP1>(A)\nG0 X0 Y0 Z10.\nG1 X50. F300\nM30", {}, 50.0),
+        ("G0X0Y0Z0\nG187P3E0.01\nG1X10.F100", {}, 10.0),
+        # SINUMERIK: header, axis positions, names of tools, absolute centres, radii
+        (('%_N_1_MPF\n;$PATH=/_N_WKS_DIR\nG0 SUPA X0 Y0 Z0 D0\nT="FACE_50"\nM6\nG54\nG0 X30 Y-20\n'
+         "Z15 D1\nG1 Z0 F300\nX10\nG2 X0 Y-10 I=AC(10) J=AC(-10)\nG3 X-10 Y0 CR=10\nG0 Z15"), {},
+         math.hypot(30, 20) + 15 + 15 + 20 + 10 * math.pi + 15),
+        ("G0 SUPA X0 Y0 Z0\nX=10 Y=IC(3)\nX=IC(-4) Y=AC(0)", {}, math.hypot(10, 3) + 5),
+        # shifts, work offsets, positions that are set
+        ("G0 X0 Y0 Z0\nG52 X100 Y50\nX0 Y0\nG52 X0 Y0\nX0 Y0", {}, 2 * math.hypot(100, 50)),
+        ("G0 X5. Y0 Z0\nG92 X0 Y0\nX10\nG92.1\nX10", {}, 15.0),
+        ("G10 L2 P2 X7.\nG0 X0 Y0 Z0\nG55 X0", {}, 7.0),
+        ("G10 L10 P3 R40.\nG0 X0 Y0 Z0\nG43 H3 Z-50", {}, 10.0),
+        ("G0 X0 Y0 Z0\nG54.1 P3 X1", {"G54.1P3X": 8.0}, 9.0),
+        ("G0 X0 Y0 Z0\nG154 P3 X1", {"G54.1P3X": 8.0}, 9.0),
+        ("G0 X0 Y0 Z0\nG1 G41 D1 X9", {"D1": 0.0}, 9.0),
+        # corners, also without blanks
+        ("G0 X0 Y0 Z0\nG1 X50 ,R5. F300\nY50,C2.\nX0", {}, 45 + 2.5 * math.pi + 43 + 8**0.5 + 48),
+        ("G0X0Y0Z0\nG1X-30.,R10.\nY-30.", {}, 40 + 5 * math.pi),
+        # rotation in the plane
+        ("G0 X0 Y0 Z0\nG68 X0 Y0 R90.\nG1 X10 Y0\nX10 Y5\nG69\nX0 Y0", {}, 15 + math.hypot(10, 5)),
+        # cycles: G83 K according to Haas, pecks of I, J, K; up at the feed; reference point 2
+        ("(HAAS)\nG0 X0 Y0 Z10.\nG83 X10. Y10. Z-40. R2. Q10. K0.2\nX50.", {}, 654.1421),
+        ("G0 X0 Y0 Z0\nG98 G85 X10 Y10 Z-10 R2\nG80\nG1 X50 Y50", {}, 28 + 50 * math.sqrt(2) - 2),
+        ("G91 G30 Z0\nG90 G0 X0 Y0\nZ10\nG1 Z0\nX50\nG91 G30 Z0\nG90 G0 Z5\nG1 X60", {}, 70.0),
+        # subprograms with repetitions
+        (("G0 X10 Y10 Z2\nM98 P12\nG0 X30 Y10 Z2\nM98 P12 L2\nM30\nO12\nG91\nG1 Z-4\nY10\nX10\n"
+         "G90\nM99"), {}, 24 + math.sqrt(216) + 48),
+        ("G0 X0 Y0 Z0\nM98 P30012\nM30\nO12\nG91 X1\nG90\nM99", {}, 3.0),
+        ("G0 X0 Y0 Z0\nM97 P5 L2\nM30\nN5 G91 X1\nM99", {}, 2.0),
+    ],
+)  # fmt: skip
+def test_common_constructs(text: str, offset: dict[str, float], length: float):
+    result = run(text, offset=tuple(offset.items()))
+    assert result.program.refused == {}
+    assert result.length_mm == pytest.approx(length, abs=2e-3)
+
+
+def test_the_path_of_a_haas_deep_hole_without_q():
+    hole = "G83 Z-40. R2. I10. J2. K3. F100."
+    result = run(f"(HAAS)\nG0 X0 Y0 Z10.\n{hole}")
+    pecks = np.cumsum([10, 8, 6, 4, 3, 3, 3, 3, 2])
+    expected = 8 + 8 + sum(np.diff(pecks, prepend=0)) + 2 * sum(pecks[:-1]) + 42
+    assert result.length_mm == pytest.approx(expected)
+
+
+def test_okuma_compensates_the_length_by_g56():
+    text = "G0 Z400 X0 Y0\n{} H1 Z-150\nG1 Z-200"
+    ends = [run(text.format(code), offset=(("H1", 100.0),)).path for code in ("G56", "G43")]
+    for path in ends:
+        assert path.coordinates["Z"][-1] == -100.0
+
+
+def test_haas_tool_centre_point():
+    text = "G0 G54 X0 Y0\n{} H1 Z20.\nG1 Z0 F500\nX50. B30. C45.\nX60. B40. C90.\nG49\nG0 Z20."
+    lengths = [
+        run(text.format(code), BC, offset=(("H1", 100.0),)).length_mm for code in ("G234", "G43.4")
+    ]
+    assert lengths == pytest.approx([105.28, 105.28], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "caveat"),
+    [
+        ("G0 X1 Y1 Z1", {"offset": (("H1", 5.0), ("G54X", 1.0), ("G55X", 1.0))}, "H1, G55X"),
+        ("G0 X1. Y1. Z1. H4", {}, "H4 without G43 (line 1)"),
+        ("G0 X50000 Y1. Z1.", {}, "X50000 (line 1); --least-increment"),
+        ("%\nG0 X1. Y1. Z1.\nG91.1\nSUPA", {}, "linuxcnc (line 3, G91.1), sinumerik"),
+        ("G0 X1. Y1. Z1.\nG73 Z0 R1. Q.5", {}, "G73 without the retraction"),
+    ],
+)  # fmt: skip
+def test_assumptions_are_stated(text: str, options: Any, caveat: str):
+    assert any(caveat in remark for remark in run(text, **options).as_json()["remarks"])
+
+
+def test_the_frame_of_a_turned_table_is_stated():
+    result = run("G0 X0 Y0 Z0 A0 C90.\nG43.4 H1 Z-100.\nX50.", AC, offset=(("H1", 100.0),))
+    assert any(
+        "G43.4 at C90: workpiece frame at rotary zero" in caveat for caveat in result.caveats()
+    )
+
+
+def test_the_least_increment_scales_numbers_without_a_point():
+    text = "G21G90\nG0X0Y0Z10000\nG1X50000F300\nY50.\nG20 Y0\nX10000"
+    result = run(text, least_increment=0.001)
+    assert result.length_mm == pytest.approx(50 + 50 + 50 + 50 - 25.4)
+    assert run("G0 X0 Y0 Z0\nX50000").length_mm == pytest.approx(50_000.0)
+
+
+def test_programs_in_utf16_are_read(tmp_path: Path):
+    path = tmp_path / "p.nc"
+    path.write_text("%\nO1\nG0 X0 Y0 Z10.\nG1 X50. F300\n", "utf-16")
+    program = Program(file=str(path))
+    assert program.run(warpspace.load_scene(MILL), ignore_progress).length_mm == pytest.approx(50.0)
+
+
+def test_a_subprogram_without_its_end_is_refused():
+    result = run(f"{START}M98 P8\nM30\nO8\nX20")
+    assert result.program.refused == {7: "X20"}
+    assert result.program.reasons[7] == "; expected M99 at the end of the subprogram"
+
+
+def test_the_command_line_reads_dialect_and_words_to_skip(tmp_path: Path):
+    (tmp_path / "a.nc").write_text(f"{START}TRANS X100 Y50\nM777\nX20\n")
+    arguments = ["program", MILL, str(tmp_path / "a.nc")]
+    skip = ["--skip", "TRANS,M777", "--dialect", "sinumerik"]
+    text = CliRunner().invoke(cli, [*arguments, *skip]).output
+    assert "Ignored because of --skip: TRANS X100 Y50" in text
+    assert "3 blocks, 20.0 mm" in text
+    assert (
+        "is not one of 'auto', 'fanuc'"
+        in CliRunner().invoke(cli, [*arguments, "--dialect", "x"]).output
+    )
