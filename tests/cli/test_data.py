@@ -4,7 +4,6 @@ import csv
 import itertools
 import re
 
-import numpy as np
 import pytest
 import trimesh
 
