@@ -123,7 +123,7 @@ MIN_EFFECT = 1e-12
 
 
 class Turn(IntEnum):
-    """How far a placement turns the workpiece, and where its effect is observed."""
+    """Extent of the turn of a placement, and where its effect is observed."""
 
     IN_FRAME = -1  # in full; the workpiece moves, in R
     SMALL = 0  # to first order
@@ -139,7 +139,8 @@ def fit_placement(
     Least squares, nodes weighted by their share of the volume; the minimum-norm solution where a
     line or a point does not determine all six. A full turn is fitted to a single field.
     """
-    columns = _columns(model, grid.coordinates, grid.point_mm)
+    pose = chain.branch_pose(model, "workpiece", grid.coordinates)
+    columns = _columns(pose, grid.point_mm)
     weighted = (grid.weights[..., None, None] * columns).reshape(-1, 6)
     normal = np.linalg.pinv(columns.reshape(-1, 6).T @ weighted, rcond=MIN_EFFECT, hermitian=True)
 
@@ -167,7 +168,8 @@ def placement_effect(
     µm and µrad, [..., 3] or [K, ..., 3]; the orientation is without the part about the tool axis.
     A full turn is that of one placement, [6].
     """
-    columns = _columns(model, coordinates, point_mm)
+    pose = chain.branch_pose(model, "workpiece", coordinates)
+    columns = _columns(pose, point_mm)
     turned = {name: np.zeros(()) if is_linear(name) else at for name, at in coordinates.items()}
     aim = chain.tool_axis(model, turned)
     rotation = chain.branch_pose(model, "workpiece", turned)[..., :3, :3]
@@ -177,7 +179,6 @@ def placement_effect(
         angle = placement[3:] * RAD_PER_URAD
         beyond = turn * (transforms.vector_rotation(turn * angle) - np.eye(3))
         beyond = beyond - transforms.skew(angle)
-        pose = chain.branch_pose(model, "workpiece", coordinates)
         arm_mm = transforms.apply(transforms.inverse(pose), point_mm)
         shift = shift + transforms.rotate(pose[..., :3, :3] @ beyond, arm_mm) * UM_PER_MM
     return (
@@ -186,8 +187,7 @@ def placement_effect(
     )
 
 
-def _columns(model: Model, coordinates: Coordinates, point_mm: Array) -> Array:
-    pose = chain.branch_pose(model, "workpiece", coordinates)
+def _columns(pose: Array, point_mm: Array) -> Array:
     rotation = pose[..., :3, :3]
     about = transforms.skew(pose[..., :3, 3] - point_mm) @ rotation * UM_PER_MM_URAD
     return np.concatenate([np.broadcast_to(rotation, about.shape), about], axis=-1)
@@ -379,6 +379,7 @@ def evaluate_field(
             model, errors, at, unreferenced, point_of_reference, exact=exact
         ).error_um
     placement = find_placement(model, errors, view, exact=exact)
+    turn = Turn.IN_FRAME if exact else Turn.SMALL
 
     def steps(at: Coordinates) -> chain.LoopLinks:
         return chain.build_links(model, at, error_values(model, errors, at), exact=exact)
@@ -395,7 +396,6 @@ def evaluate_field(
         )
         if placement is not None:
             part = grids.cut(point, nodes)
-            turn = Turn.IN_FRAME if exact else Turn.SMALL
             placed = map(split, placement_effect(model, placement, at, part, turn))
             error_um, tilt = map(subtract, (error_um, tilt), placed)
         error_um = subtract(error_um, split(grids.cut(fixed, nodes)))

@@ -22,7 +22,7 @@ from warpspace.field.evaluate import (
     placed_words,
     placement_effect,
 )
-from warpspace.field.grid import DEFAULT_NODES, build_grid
+from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import Parameter, parameter
 from warpspace.machine.limits import MAX_ERROR, MAX_TEXT, MIN_HALF_WIDTH, REPAIR_COUNT, REPAIR_NODES
@@ -137,7 +137,7 @@ class Adjust(description.Analysis):
         basis = grid_basis(scene, grid, view, self.included(scene))
         amplitudes = amplitudes_of(scene.errors, basis.keys)
         volume = Volume(basis, grid, amplitudes)
-        candidates = _candidates(volume, self, placements=_placements(scene, volume))
+        candidates = _candidates(scene, volume, self)
         limits = np.array([self.limit_of(key) for key in basis.keys])
         low = np.maximum(-limits, -MAX_ERROR - amplitudes)
         high = np.minimum(limits, MAX_ERROR - amplitudes)
@@ -385,24 +385,23 @@ def _with_uncertainty(
     )
 
 
-def _placements(scene: Scene, volume: Volume) -> Array:
-    """Find the errors, [K], that move the whole volume as a placement of the workpiece does."""
-    grid, response = volume.grid, volume.basis.position
+def _is_placement(scene: Scene, grid: Grid, response: Array) -> Array:
+    """Find the responses, [K], that are those of a placement of the workpiece."""
     fitted = fit_placement(scene.model, grid, response)
     rest = response - placement_effect(scene.model, fitted, grid.coordinates, grid.point_mm)[0]
     largest = [np.abs(part).max(axis=(1, 2, 3, 4), initial=0.0) for part in (rest, response)]
     return np.less_equal(largest[0], PLACEMENT_ONLY * largest[1])
 
 
-def _candidates(volume: Volume, analysis: Adjust, *, placements: Array) -> tuple[int, ...]:
+def _candidates(scene: Scene, volume: Volume, analysis: Adjust) -> tuple[int, ...]:
     keys = volume.basis.keys
     active = [keys[index] for index in volume.active_indices]
     if ALL in analysis.adjustable:
         places = volume.active_indices
     elif not analysis.adjustable:
-        places = tuple(
-            i for i in volume.active_indices if parameter(keys[i]).is_constant and not placements[i]
-        )
+        constants = [i for i in volume.active_indices if parameter(keys[i]).is_constant]
+        replaced = _is_placement(scene, volume.grid, volume.basis.position[constants])
+        places = tuple(i for i, is_placed in zip(constants, replaced, strict=True) if not is_placed)
     else:
         for key in analysis.adjustable:
             if key not in active:

@@ -17,7 +17,7 @@ from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
 from warpspace.machine.axes import TravelDirection, direction_index, is_linear, parameter
 from warpspace.machine.curves.simple import Directional
 from warpspace.machine.errors import ErrorSet
-from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, choose_view
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 
 NEWTON_STEPS = 3  # each leaves a hundredth of a correction where bodies are inclined by 10 mrad
@@ -167,7 +167,7 @@ def build_corrector(scene: Scene, loop: str = "", *, orientation: bool = False) 
         raise OptionError(
             f"the machine {machine.chain} has no rotary axis; {{orientation}} needs one"
         )
-    chosen = Loop(loop) if loop else scene.default_loop
+    chosen = choose_view(scene, loop).loop
     if chosen is Loop.TOOL:
         linear = tuple(axis for axis in linear if axis in machine.chain.tool)
         rotary = tuple(axis for axis in rotary if axis in machine.chain.tool)
