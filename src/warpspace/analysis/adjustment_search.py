@@ -74,6 +74,15 @@ class Volume:
     def statistics(self, amplitudes: Array) -> Statistics:
         return volume_statistics(self.basis.evaluate(amplitudes, orientation=False), self.grid)
 
+    def mean(self, indices: tuple[int, ...], change: Array) -> tuple[float, Array]:
+        """Return the mean |E| after a change, µm, and its slope along each changed error, [k]."""
+        chosen = self.response[list(indices)]
+        error = self.error_um + np.tensordot(change, chosen, 1)
+        norm = np.sqrt(np.einsum("nc,nc->n", error, error))
+        weights = self.grid.weights.reshape(-1) / self.grid.weights.sum()
+        direction = error * (weights / np.maximum(norm, np.finfo(float).tiny))[:, None]
+        return float(weights @ norm), np.einsum("knc,nc->k", chosen, direction)
+
 
 class Objective(StrEnum):
     """Quantity that is minimised over the volume."""
@@ -102,12 +111,16 @@ class Search:
     volume: Volume
     objective: Objective
     bounds: Array  # [K, 2], µm or µrad; least and largest change of every error of the basis
+    mean_um: float = np.inf  # largest mean |E| after the change
 
     def least(self, indices: tuple[int, ...], give_up_um: float = np.inf) -> Solution | None:
-        """Find the best change of some errors; None where it cannot beat `give_up_um`."""
+        """Find the best change of some errors.
+
+        None where it cannot beat `give_up_um`, or where no change keeps the mean.
+        """
         if self.objective is Objective.RMS:
-            return least_rms(self.volume, indices, self.bounds)
-        return least_max(self.volume, indices, self.bounds, give_up_um)
+            return least_rms(self.volume, indices, self.bounds, self.mean_um)
+        return least_max(self.volume, indices, self.bounds, give_up_um, self.mean_um)
 
     def best(
         self, sets: Iterator[tuple[int, ...]], start: Solution | None = None
@@ -153,11 +166,33 @@ class Search:
         return best
 
 
-def least_rms(volume: Volume, indices: tuple[int, ...], bounds: Array) -> Solution:
-    """Minimise the root mean square over the volume: weighted least squares within bounds."""
+def least_rms(
+    volume: Volume, indices: tuple[int, ...], bounds: Array, mean_um: float = np.inf
+) -> Solution | None:
+    """Minimise the root mean square over the volume: weighted least squares within bounds.
+
+    Where that raises the mean above `mean_um`, the same as a convex program with this constraint.
+    """
     matrix, error = volume.triangle
-    chosen = matrix[:, indices]
-    change = _least_squares(chosen, -error, *bounds[list(indices)].T)
+    chosen, ranges = matrix[:, indices], bounds[list(indices)]
+    change = _least_squares(chosen, -error, *ranges.T)
+    if mean_um < np.inf and volume.mean(indices, change)[0] > mean_um + CLOSE_UM:
+        from scipy.optimize import minimize
+
+        def square(change: Array) -> tuple[float, Array]:
+            rest = chosen @ change + error
+            return float(rest @ rest), 2.0 * rest @ chosen
+
+        constraint = {
+            "type": "ineq",
+            "fun": lambda change: mean_um - volume.mean(indices, change)[0],
+            "jac": lambda change: -volume.mean(indices, change)[1],
+        }
+        change = minimize(
+            square, change, jac=True, method="SLSQP", bounds=ranges, constraints=[constraint]
+        ).x
+        if volume.mean(indices, change)[0] > mean_um + CLOSE_UM:
+            return None
     return Solution(indices, change, float(np.linalg.norm(chosen @ change + error)))
 
 
@@ -172,7 +207,11 @@ def _least_squares(matrix: Array, goal: Array, low: Array, high: Array) -> Array
 
 
 def least_max(
-    volume: Volume, indices: tuple[int, ...], bounds: Array, give_up_um: float = np.inf
+    volume: Volume,
+    indices: tuple[int, ...],
+    bounds: Array,
+    give_up_um: float = np.inf,
+    mean_um: float = np.inf,
 ) -> Solution | None:
     """Minimise the largest error of all nodes; see `Search.least`.
 
@@ -183,15 +222,23 @@ def least_max(
     u · (e + A x) ≤ t below the objective. A linear program with the planes found so far gives a
     lower bound and the next x; there the worst nodes give new planes, u being the direction of
     their error. It ends when the best x met is within `CLOSE_UM` of the lower bound, which is
-    proof for all nodes at once.
+    proof for all nodes at once. The mean is convex as well: where it exceeds `mean_um`, its tangent
+    plane is added.
     """
     if len(indices) == 1:
-        return _least_max_of_one(volume, indices[0], bounds[indices[0]], give_up_um)
+        alone = _least_max_of_one(volume, indices[0], bounds[indices[0]], give_up_um)
+        if (
+            alone is None
+            or mean_um == np.inf
+            or volume.mean(indices, alone.change)[0] <= mean_um + CLOSE_UM
+        ):
+            return alone
     from scipy.optimize import linprog
 
     chosen = volume.response[list(indices)]
     size = len(indices)
-    change = least_rms(volume, indices, bounds).change
+    matrix, present = volume.triangle
+    change = _least_squares(matrix[:, indices], -present, *bounds[list(indices)].T)
     ranges = [*map(tuple, bounds[list(indices)]), (0.0, None)]
     goal = np.zeros(size + 1)
     goal[-1] = 1.0
@@ -202,7 +249,11 @@ def least_max(
         error = volume.error_um + np.tensordot(change, chosen, 1)
         norm = np.sqrt(np.einsum("nc,nc->n", error, error))
         largest = float(norm.max())
-        if largest < best_um:
+        mean, slope = volume.mean(indices, change) if mean_um < np.inf else (0.0, goal[:-1])
+        if mean > mean_um:
+            planes.append(np.append(slope, 0.0)[None])
+            offsets.append(np.array([mean_um - mean + slope @ change]))
+        if mean <= mean_um + CLOSE_UM and largest < best_um:
             best, best_um = change, largest
         count = min(NODES_AT_ONCE, norm.size)
         worst = np.argpartition(norm, -count)[-count:]
@@ -218,7 +269,7 @@ def least_max(
         if best_um - solution.fun < CLOSE_UM:
             break
         change = np.clip(solution.x[:size], *bounds[list(indices)].T)
-    return Solution(indices, best, best_um)
+    return Solution(indices, best, best_um) if best_um < np.inf else None
 
 
 def _least_max_of_one(
@@ -230,7 +281,8 @@ def _least_max_of_one(
     along = (np.einsum("nc,nc->n", other, response) for other in (volume.error_um, response))
     products = np.stack([volume.square_um2, *along])
     ends: dict[bool, tuple[float, float, float]] = {}  # place, value, slope where it falls, rises
-    at, best, best_um = 0.0, 0.0, np.inf
+    at = best = float(np.clip(0.0, low, high))
+    best_um = np.inf
     for _ in range(MOST_STEPS):
         squares = np.array([1.0, 2.0 * at, at * at]) @ products
         worst = int(np.argmax(squares))

@@ -25,6 +25,7 @@ from warpspace.field.evaluate import (
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import Parameter, parameter
+from warpspace.machine.errors import Tolerance
 from warpspace.machine.limits import MAX_ERROR, MAX_TEXT, MIN_HALF_WIDTH, REPAIR_COUNT, REPAIR_NODES
 from warpspace.scene.model import Scene, evaluate_grid, grid_basis, second_order, with_placement
 from warpspace.units import Array, spell, spell_short
@@ -32,6 +33,8 @@ from warpspace.units import Array, spell, spell_short
 DEFAULT_LIMIT = 200.0  # µm or µrad by which an error may be changed, unless somebody says otherwise
 PLACEMENT_ONLY = 1e-9  # share of its effect that remains of an error which is only a placement
 MOST_BARS, MOST_VALUES = 14, 3  # errors in a chart, and values beside a bar
+WORTHWHILE = 0.01  # least gain of a proposed set over smaller ones, as a share of the present value
+NO_TOLERANCE = Tolerance(0.0, np.inf)
 OBJECTIVE_WORDS = {Objective.RMS: "RMS |E|", Objective.MAX: "largest |E|"}
 FOUR = ("mean_um", "rms_um", "p95_um", "max_um")
 
@@ -88,7 +91,8 @@ class Adjust(description.Analysis):
     with all other errors as they are. Then follow the best sets of one, two, three … adjustments.
     RMS is made smallest by weighted least squares, max as a convex problem, to within 0.0001 µm.
     Model: first order; the sets found are evaluated again with the exact chain. Each node of the
-    grid weighs its share of the volume.
+    grid weighs its share of the volume. Sets keep the tolerances of the scene and do not increase
+    the mean.
     """
 
     name = "adjust"
@@ -121,6 +125,9 @@ class Adjust(description.Analysis):
         "Largest change of one error or of each, in µm or µrad",
         unset=f"±{DEFAULT_LIMIT:g}",
     )
+    unconstrained: bool = option(
+        False, "Also propose values beyond the tolerances, and sets that increase the mean"
+    )
     grid: int = option(
         DEFAULT_NODES,
         "Nodes per axis of the working volume",
@@ -142,9 +149,14 @@ class Adjust(description.Analysis):
         low = np.maximum(-limits, -MAX_ERROR - amplitudes)
         high = np.minimum(limits, MAX_ERROR - amplitudes)
         bounds = np.column_stack([np.minimum(low, 0.0), np.maximum(high, 0.0)])
+        before = Summary(*volume.statistics(amplitudes).four)
         off = bool(np.any(volume.error_um))
         sets: list[AdjustedSet] = []
-        search = Search(volume, self.objective, bounds)
+        each = search = Search(volume, self.objective, bounds)
+        if not self.unconstrained:
+            tolerated = self._within_tolerance(scene, basis.keys, amplitudes, bounds)
+            search = replace(each, bounds=tolerated, mean_um=before.mean_um)
+        candidates = tuple(index for index in candidates if np.ptp(search.bounds[index]))
         for best, proven in search.best_sets(candidates if off else (), self.count):
             values = amplitudes[list(best.indices)] + best.change
             adjust = {basis.keys[i]: float(v) for i, v in zip(best.indices, values, strict=True)}
@@ -155,13 +167,13 @@ class Adjust(description.Analysis):
                 AdjustedSet(*numbers.four, adjust=adjust, proven=proven, exact=Summary(*exact.four))
             )
             watch(len(sets) / (self.count + 1))
-        errors = [_effect(search, i) for i in volume.active_indices if amplitudes[i] != 0.0]
+        errors = [_effect(each, i) for i in volume.active_indices if amplitudes[i] != 0.0]
         name = f"{self.objective}_um"
         keys = [basis.keys[index] for index in candidates]
         result = AdjustResult(
             analysis=self,
             scene=scene,
-            before=Summary(*volume.statistics(amplitudes).four),
+            before=before,
             errors=tuple(sorted(errors, key=lambda effect: round(getattr(effect.best, name), 6))),
             adjustments=tuple(sets),
             adjustable={key: self.limit_of(key) for key in keys},
@@ -175,6 +187,19 @@ class Adjust(description.Analysis):
 
     def included(self, scene: Scene) -> Sequence[str]:
         return scene.parameter_keys
+
+    def _within_tolerance(
+        self, scene: Scene, keys: Sequence[str], amplitudes: Array, bounds: Array
+    ) -> Array:
+        """Restrict changes, [K, 2], to new values within tolerance, or towards it."""
+        tolerances = [scene.tolerances.get(key) or NO_TOLERANCE for key in keys]
+        centre = np.array([tolerance.centre for tolerance in tolerances]) - amplitudes
+        half_width = np.array([tolerance.half_width for tolerance in tolerances])
+        low, high = (np.clip(centre + side * half_width, *bounds.T) for side in (-1.0, 1.0))
+        is_out_of_reach = low == high
+        low[is_out_of_reach] = np.minimum(low[is_out_of_reach], 0.0)
+        high[is_out_of_reach] = np.maximum(high[is_out_of_reach], 0.0)
+        return np.column_stack([low, high])
 
     def limit_of(self, key: str) -> float:
         """Return the largest change of one error, µm or µrad."""
@@ -206,6 +231,17 @@ class AdjustResult(description.Result):
     @property
     def view(self) -> View:
         return self.scene.view(self.analysis.loop)
+
+    @property
+    def worthwhile(self) -> Sequence[int]:
+        """Indices of the sets that gain at least `WORTHWHILE` over all smaller ones."""
+        name, indices = f"{self.objective}_um", list[int]()
+        least: float = getattr(self.before, name)
+        for index, adjusted in enumerate(self.adjustments):
+            if getattr(adjusted, name) < least - WORTHWHILE * getattr(self.before, name):
+                indices.append(index)
+                least = getattr(adjusted, name)
+        return indices
 
     @property
     def all_sets_compared(self) -> list[bool]:
@@ -289,7 +325,18 @@ class AdjustResult(description.Result):
         else:
             each = (f"{key} ±{limit:g}" for key, limit in self.adjustable.items())
             bounds = f"by at most {', '.join(each)}"
+        if not self.analysis.unconstrained:
+            has_tolerances = any(map(self.scene.tolerances.get, self.adjustable))
+            kept = ", within tolerance" if has_tolerances else ""
+            bounds += f"{kept}, without a larger mean"
         yield f"  adjusted: {', '.join(self.adjustable)}; {bounds}"
+        worthwhile = self.worthwhile
+        idle = [str(i + 1) for i in range(len(self.adjustments)) if i not in worthwhile]
+        if idle:
+            yield (
+                f"  not proposed: set {', '.join(idle)} (gains less than {WORTHWHILE:.0%} of the"
+                f" {OBJECTIVE_WORDS[self.objective]} over smaller sets)"
+            )
         sizes = [str(len(adjusted.adjust)) for adjusted in self.adjustments if not adjusted.proven]
         yield (
             "  all sets compared"
@@ -308,7 +355,7 @@ class AdjustResult(description.Result):
 
     def _adjustments(self, adjusted: AdjustedSet) -> str:
         return ", ".join(
-            f"{key} {self.present[key]:.4g} → {value:.4g} {parameter(key).unit}"
+            f"{key} {self.present[key]:.4g} → {round(value, 6) + 0.0:.4g} {parameter(key).unit}"
             for key, value in adjusted.adjust.items()
         )
 

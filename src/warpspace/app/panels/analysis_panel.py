@@ -354,7 +354,8 @@ def _change_html(state: AppState, change: Change) -> Markup:
         before, after = (PLAIN.evaluate(state).statistics for state in (before_state, after_state))
     except WarpspaceError:
         return join(lines)
-    pairs = (("max", before.max_um, after.max_um), ("mean", before.mean_um, after.mean_um))
+    numbers = {"max": "max_um", "mean": "mean_um", "RMS": "rms_um"}
+    pairs = ((name, getattr(before, at), getattr(after, at)) for name, at in numbers.items())
     return join(lines) + html.rows(
         (name, f"{html.number(a)} → {html.number(b)} µm") for name, a, b in pairs
     )

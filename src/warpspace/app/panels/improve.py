@@ -30,8 +30,6 @@ from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import REPAIR_NODES
 from warpspace.scene.model import Scene
 
-NO_GAIN_UM = 0.005  # smaller improvements are not offered
-
 
 @dataclass(frozen=True, kw_only=True)
 class AdjustIncluded(Adjust):
@@ -56,9 +54,6 @@ class AdjustPanel(AnalysisPanel):
         changes = {"default": None, "choices": ("all",), "choice_labels": {"all": "any error"}}
         return [replace(o, **changes) if o.name == "adjustable" else o for o in super().options()]
 
-    def defaults(self, state: AppState) -> Mapping[str, str]:
-        return {**super().defaults(state), "objective": Objective.MAX}
-
     def inputs(self, state: AppState) -> Mapping[str, Any]:
         return {"keys": tuple(filter(state.exclusions.active, state.amplitudes))}
 
@@ -73,19 +68,14 @@ class AdjustPanel(AnalysisPanel):
             return tag("p", text)
         if not self.offered_changes(result):
             keys = ", ".join(result.adjustable)
-            return tag("p", f"No improvement possible: {keys} have their optimum values.")
+            limits = "" if result.analysis.unconstrained else " within tolerance"
+            text = f"No adjustment of {keys}{limits} reduces the error by 1 % or more."
+            return tag("p", text)
         objective = "largest |E|" if result.objective is Objective.MAX else "RMS of |E|"
         return quiet(f"Adjustments that minimise the {objective}.")
 
     def offered_changes(self, result: Any) -> Sequence[int]:
-        """Return the sets that improve on smaller ones, which come first."""
-        name, indices = f"{result.objective}_um", list[int]()
-        least: float = getattr(result.before, name)
-        for index, adjustment in enumerate(result.adjustments):
-            if least - getattr(adjustment, name) >= NO_GAIN_UM:
-                indices.append(index)
-                least = getattr(adjustment, name)
-        return indices
+        return result.worthwhile
 
     def result_html(self, result: Result) -> Markup:
         blocks = (block for block in result.blocks() if not isinstance(block, str))

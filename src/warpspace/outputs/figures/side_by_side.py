@@ -131,11 +131,12 @@ def draw_adjustment(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
     grid = min(settings.grid, REPAIR_NODES[1])
     adjustment = Adjust(loop=settings.chosen_loop, grid=grid).run(scene)
     after, remark = scene, "no adjustment required"
-    if adjustment.adjustments:
-        after = adjustment.changes()[-1].scene
+    if adjustment.worthwhile:
+        proposed = adjustment.worthwhile[0]
+        after = adjustment.changes()[proposed].scene
         parts = ", ".join(
             f"{key} {adjustment.present[key]:.3g} → {value:.3g} {parameter(key).unit}"
-            for key, value in adjustment.adjustments[-1].adjust.items()
+            for key, value in adjustment.adjustments[proposed].adjust.items()
         )
         remark = f"adjusted for the smallest {adjustment.objective.upper()}: {parts}"
     after = replace(after, title="after", name=f"{scene.name}_adjusted")

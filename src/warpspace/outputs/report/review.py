@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpspace.analysis.adjustment_search import Objective
 from warpspace.analysis.blocks import Column, Mark, Table, number_columns
 from warpspace.analysis.commands.adjust import Adjust, AdjustResult
 from warpspace.analysis.commands.contributions import Contributions, Explanation, explain
@@ -29,7 +28,6 @@ from warpspace.scene.model import Scene, common_loop, second_order
 from warpspace.units import spell, spell_short, spell_signed
 
 UM, PERCENT = "\N{NO-BREAK SPACE}µm", "\N{NO-BREAK SPACE}%"
-_WORTH = 0.01  # least reduction of the largest error, as a share, by a recommended adjustment
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,10 +55,8 @@ class ReportSettings:
                 limit_um=limit_um,
             )  # fmt: skip
 
-        repair = Adjust(loop=loop, grid=min(self.grid, REPAIR_NODES[1]))
         return {
-            "advice": replace(repair, objective=Objective.MAX, count=1),
-            "adjust": repair,
+            "adjust": Adjust(loop=loop, grid=min(self.grid, REPAIR_NODES[1])),
             "gains": Gains(loop=loop, over_travel=True),
             "worst": machines(LIMIT_REDUCTION),
             "sampled": machines(Reduction.SAMPLED),
@@ -182,7 +178,7 @@ def _review_scene(letter: str, picture: ScenePicture, settings: ReportSettings) 
         second_order(scene, picture.view.loop).um,
         results,
         0.0 if scene.limit_um is None else share_below(picture.field, scene.limit_um),
-        _advice(picture, results["advice"], settings),
+        _advice(picture, results["adjust"], settings),
         volume_uncertainty(scene, picture.view, settings.grid),
     )
 
@@ -252,20 +248,27 @@ def _advice(picture: ScenePicture, adjustment: Result | str, settings: ReportSet
         return "No adjustment required: the error is within the limit."
     if not isinstance(adjustment, AdjustResult) or not adjustment.adjustments:
         return "No adjustment possible: no squareness or alignment error acts in this loop."
-    after = evaluate_picture(adjustment.changes()[0].scene, grid=settings.grid, loop=settings.loop)
-    largest = after.statistics.max_um
-    if not largest < (1.0 - _WORTH) * before:
-        return "No single adjustment reduces the largest error; a set may, see Adjustments."
-    ((key, value),) = adjustment.adjustments[0].adjust.items()
-    row = parameter(key)
-    effect = f"the largest error falls from {spell(before)} to {spell(largest)}{UM}"
+    if not adjustment.worthwhile:
+        return "No adjustment within tolerance reduces the RMS by 1 % or more."
+    proposed = adjustment.worthwhile[0]
+    scene, adjusted = adjustment.changes()[proposed].scene, adjustment.adjustments[proposed]
+    after = evaluate_picture(scene, grid=settings.grid, loop=settings.loop)
+    largest, rms = after.statistics.max_um, adjusted.rms_um
+    effect = (
+        f"the RMS changes from {spell(adjustment.before.rms_um)} to {spell(rms)}{UM}, the largest"
+        f" error from {spell(before)} to {spell(largest)}{UM}"
+    )
     if limit is not None and largest <= limit:
         effect += ", within the limit"
     elif limit is not None:
         share = volume_share(share_below(after.field, limit))
         effect += f"; {share} of the volume is within the limit"
-    change = f"from {spell_setting(adjustment.present[key])} to {spell_signed(value)} {row.unit}"
-    return f"Adjust {key} ({row.name}) {change}: {effect}."
+    changes = ", ".join(
+        f"{key} ({parameter(key).name}) from {spell_setting(adjustment.present[key])} to"
+        f" {spell_signed(value)} {parameter(key).unit}"
+        for key, value in adjusted.adjust.items()
+    )
+    return f"Adjust {changes}: {effect}."
 
 
 def first_page(review: Review, picture: Block) -> list[Block]:

@@ -338,8 +338,8 @@ def result_blocks(review: Review, figures: ReportFigures, *names: str) -> Iterat
                 yield from report_blocks(blocks, figures)
                 continue
             yield from report_blocks(blocks)
-            if result.changes():
-                caption = "Before, after the last set of the table, and their difference."
+            if result.worthwhile:
+                caption = f"Before, after set {result.worthwhile[0] + 1}, and their difference."
                 yield figures.begin("adjust", [reviewed.scene], reviewed.titled(caption))()
 
 
