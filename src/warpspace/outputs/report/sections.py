@@ -22,6 +22,7 @@ from warpspace.analysis.blocks import (
     number_columns,
 )
 from warpspace.analysis.blocks import Block as AnyBlock
+from warpspace.analysis.commands.adjust import AdjustResult
 from warpspace.analysis.commands.concepts import Concepts
 from warpspace.analysis.description import ProgressCallback, Result, ignore_progress
 from warpspace.analysis.note_tables import notes_table
@@ -334,7 +335,7 @@ def result_blocks(review: Review, figures: ReportFigures, *names: str) -> Iterat
             before = numbers
             title, *blocks = result.blocks()
             yield Text(reviewed.titled(str(title)), "heading")
-            if name != "adjust":
+            if not isinstance(result, AdjustResult):
                 yield from report_blocks(blocks, figures)
                 continue
             yield from report_blocks(blocks)
