@@ -16,6 +16,7 @@ from warpspace.analysis.options import Option, read_numbers
 from warpspace.analysis.sampling.cases import Case, Reduction, SamplingPlan
 from warpspace.analysis.sampling.distribution import Distribution, Draws, Probability, Stream
 from warpspace.analysis.sampling.tolerance_search import Ensemble, build_ensemble
+from warpspace.analysis.sampling.worst_case import worst_case_um
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, fill, join, number, tag
 from warpspace.app.evaluation.cache import Cache
@@ -212,13 +213,19 @@ def sample_machines(state: AppState) -> Ensemble:
 
 
 def allowed_words(state: AppState) -> str:
-    """Format the largest error of machines within tolerance; empty without tolerances."""
+    """Format the largest |E| of sampled machines within tolerance, and that of all of them."""
     try:
         ensemble = sample_machines(state)
     except WarpspaceError:
         return ""
-    largest = float(ensemble.norm_um(*_centres_and_widths(ensemble, state.tolerances)).max())
-    return f"tolerances allow {number(largest)} µm" if largest else ""
+    ranges = _centres_and_widths(ensemble, state.tolerances)
+    largest = float(ensemble.norm_um(*ranges).max())
+    if not largest:
+        return ""
+    sampled = f"tolerances: {number(largest)} µm ({spell_count(len(ensemble.unit))} samples)"
+    if ensemble.spread is not None:  # each machine at a point of its own
+        return sampled
+    return f"{sampled} · {number(worst_case_um(ensemble.gains.astype(float), *ranges))} µm (worst case)"
 
 
 def _centres_and_widths(ensemble: Ensemble, tolerances: ToleranceSet) -> Array:
