@@ -55,14 +55,56 @@ def test_every_key_is_there_once_and_none_without_ctrl_changes_the_model():
             assert replace(after, exaggeration=None).resulting_scene() == before, command.label
 
 
+def help_dialog():
+    context = Alone(page_panels.PagePanel, STATE).context
+    panels = page_panels.build_panels(context)
+    sections = [panel for panel in panels if isinstance(panel, page_panels.Section)]
+    return Alone(page_panels.HelpDialog, STATE, sections)
+
+
 def test_commands_are_found_by_words_and_enter_runs_the_first():
-    window = Alone(page_panels.HelpDialog, STATE)
+    window = help_dialog()
     window.store.apply(lambda state: put(state, "page.command", "zero err"))
     assert window.html.count('data-do="help:run"') == 1
     window.do("first", "whatever")
     assert window.sent == [("page:zero", "")]
     window.do("run", HOSTILE)
     assert len(window.sent) == 1
+
+
+@pytest.mark.parametrize(
+    ("query", "event"),
+    [
+        ("compare", ("compare:menu", "")),
+        ("circular", ("test:choose", "circular")),
+        ("ball bar", ("test:choose", "circular")),
+        ("toleranc", ("page:section", "design.allocate")),
+        ("import", ("page:section", "measure.import")),
+        ("adjust", ("page:section", "improve.adjust")),
+        ("gains", ("page:section", "understand.gains")),
+    ],
+)
+def test_sections_and_tests_are_found_by_the_words_of_users(query, event):
+    window = help_dialog()
+    window.store.apply(lambda state: put(state, "page.command", query))
+    window.do("first")
+    assert window.sent == [event]
+
+
+def test_a_search_without_a_match_says_so():
+    window = help_dialog()
+    window.store.apply(lambda state: put(state, "page.command", "<b>flux"))
+    assert "No command matches “&lt;b&gt;flux”." in window.html
+
+
+def test_a_section_is_opened_in_its_task():
+    page = Alone(page_panels.PagePanel, put(STATE, "page.window", "help"))
+    page.do("section", "design.concepts")
+    look = page.store.state.page
+    assert (look.task, look.window) == ("design", "")
+    assert "concepts" in look.open
+    page.do("section", HOSTILE)
+    assert page.store.state.page.task == "design"
 
 
 def test_a_link_says_what_it_holds_and_asks_before_it_holds_the_token():

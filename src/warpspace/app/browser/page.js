@@ -403,6 +403,11 @@
     // scroll to a note, after the list is opened
     reveal(id) { setTimeout(() => document.getElementById(id)?.focus(), 300); },
     show(pieces) { for (const [name, html] of Object.entries(pieces)) write(name, html); },
+    menu(name) {
+      const menu = document.querySelector(`[data-key="menu-${name}"]`);
+      if (menu) menu.open = true;
+      menu?.querySelector("summary").focus();
+    },
     title(words) { document.title = `${words} · warpspace`; },
     dark(on) { document.documentElement.classList.toggle("ws-dark", on); },
   };

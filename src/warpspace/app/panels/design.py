@@ -225,7 +225,8 @@ def allowed_words(state: AppState) -> str:
     sampled = f"tolerances: {number(largest)} µm ({spell_count(len(ensemble.unit))} samples)"
     if ensemble.spread is not None:  # each machine at a point of its own
         return sampled
-    return f"{sampled} · {number(worst_case_um(ensemble.gains.astype(float), *ranges))} µm (worst case)"
+    worst_um = worst_case_um(ensemble.gains.astype(float), *ranges)
+    return f"{sampled} · {number(worst_um)} µm (worst case)"
 
 
 def _centres_and_widths(ensemble: Ensemble, tolerances: ToleranceSet) -> Array:

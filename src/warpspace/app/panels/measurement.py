@@ -187,7 +187,8 @@ class TestsPanel(FilesPanel):
         if action == "choose" and value in ("", *bench_names()):
             self.outcome, self.files, self._upload_problem = None, (), ""
             other_forms = {k: v for k, v in state.forms.items() if k.partition(".")[0] != TEST}
-            state = replace(state, forms=other_forms | ({TEST: value} if value else {}))
+            page = replace(state.page, task=self.task, open=state.page.open | {TEST})
+            state = replace(state, page=page, forms=other_forms | ({TEST: value} if value else {}))
             return edits.with_sight(state, inside=bool(value))
         if action == "path":
             return with_form(state, "test.path", value)

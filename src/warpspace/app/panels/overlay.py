@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -380,6 +380,9 @@ class ComparePanel(Panel):
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         """Set a side of the comparison; an unknown title is ignored."""
         chosen, scene = state.comparison, self.context.scenes.get(value)
+        if action == "menu":
+            self.context.call_soon(partial(self.context.page.call, "menu", self.name))
+            return state
         if action == "pin":
             return with_pin(state)
         if action == "leave" or (action == "set.b" and value == NOBODY):

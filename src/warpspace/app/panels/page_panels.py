@@ -1,7 +1,7 @@
 """The top bar, all commands with their keys, the tasks, and the list of all panels."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from textwrap import shorten
@@ -26,6 +26,7 @@ from warpspace.app.panels.upload_panels import ImportPanel, PartPanel, ProgramPa
 from warpspace.app.state.app_state import AppState, Exclusions
 from warpspace.app.state.look import TASKS
 from warpspace.app.state.tree import put, toggled
+from warpspace.bench.base import bench_names, find_test
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_UPLOAD_BYTES
 
@@ -118,6 +119,7 @@ class Command:
     event: str
     value: str = ""
     keys: tuple[str, ...] = ()  # in the notation of page.js, the most common one first
+    words: str = ""  # further words by which it is found
 
     @property
     def key_label(self) -> str:
@@ -140,6 +142,7 @@ COMMANDS = (
     Command("Play the story", "story:start"),
     Command("Pin a note", "notes:pin", keys=("n",)),
     Command("Notes", "notes:open"),
+    Command("Compare two scenes", "compare:menu", words="difference before after"),
     Command("Find an error", "find", keys=("/",)),
     Command("Fit the view", "page:fit", keys=("f",)),
     Command("Component: magnitude of the error", "state:set.component", "norm", ("1",)),
@@ -181,15 +184,39 @@ MEANINGS = (
 )
 
 
-def _find_commands(query: str) -> list[Command]:
-    search_words = query.lower().split()
-    return [c for c in COMMANDS if all(word in c.label.lower() for word in search_words)]
+def _section_commands(sections: Iterable[Section]) -> Iterator[Command]:
+    """List the commands that open a section of a task, or choose a standard test."""
+    for section in sections:
+        label = f"{TASKS[section.task]}: {section.title.lower()}"
+        place, words = f"{section.task}.{section.name}", f"{section.name} {section.sentence}"
+        yield Command(label, "page:section", place, words=words.lower())
+    for test in map(find_test, bench_names()):
+        label, words = (
+            f"Standard test: {test.title.lower()}",
+            f"{test.name} {test.standard} {test.description}",
+        )
+        yield Command(label, "test:choose", test.name, words=words.lower())
 
 
 class HelpDialog(Dialog):
     """All commands with a search box; mouse and keyboard; legend of the drawing."""
 
     name, title = "help", "Help"
+
+    def __init__(self, context: Context, sections: Iterable[Section]) -> None:
+        super().__init__(context)
+        self.sections = tuple(sections)
+
+    def _find_commands(self, query: str) -> list[Command]:
+        """Find commands by all words of a query; sections and tests only by a query."""
+        search_words = query.lower().split()
+        commands = (*COMMANDS, *_section_commands(self.sections)) if search_words else COMMANDS
+
+        def matches(text: str) -> bool:
+            return all(word in text for word in search_words)
+
+        found = [c for c in commands if matches(f"{c.label.lower()} {c.words}")]
+        return sorted(found, key=lambda command: not matches(command.label.lower()))
 
     def body(self, picture: LivePicture) -> Markup:
         query, scene = picture.state.page.command, picture.state.scene
@@ -200,8 +227,8 @@ class HelpDialog(Dialog):
             tag("button", tag("kbd", command.key_label) + command.label, type="button",
                 data_do="help:run", data_value=command.label)
             if ":" in command.event else tag("p", tag("kbd", command.key_label) + command.label)
-            for command in _find_commands(query)
-        )  # fmt: skip
+            for command in self._find_commands(query)
+        ) or quiet(f"No command matches “{query}”.")  # fmt: skip
         about = " ".join(scene.description.split())
         return join((
             tag("div", box + tag("div", commands, class_="ws-list ws-columns"), data_list=True),
@@ -214,7 +241,7 @@ class HelpDialog(Dialog):
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         query = state.page.command
-        matches = [command for command in _find_commands(query) if ":" in command.event]
+        matches = [command for command in self._find_commands(query) if ":" in command.event]
         is_first = action == "first" and bool(query)
         if action == "run":
             matches = [command for command in matches if command.label == value]
@@ -253,6 +280,7 @@ class PagePanel(Panel):
             "task": partial(put, state, "page.task", value),
             "fold": partial(toggled, state, "page.open", value),
             "open": partial(put, put(state, "page.command", ""), "page.window", value),
+            "section": partial(_with_section, state, *value.partition(".")[::2]),
             **dict.fromkeys(("close", "tour"), partial(put, state, "page.window", "")),
             "include": partial(replace, state, exclusions=Exclusions()),
             "zero": state.zeroed,
@@ -271,6 +299,12 @@ class PagePanel(Panel):
             return
         done = {"undo": "Undone", "redo": "Redone"}[name]
         self.context.notify(f"{done}: {description}" if description else f"Nothing to {name}")
+
+
+def _with_section(state: AppState, task: str, section: str) -> AppState:
+    """Show a task with a section open."""
+    state = put(put(state, "page.task", task), "page.window", "")
+    return replace(state, page=replace(state.page, open=state.page.open | {section}))
 
 
 # --- The tasks, and all panels --------------------------------------------------------------------
@@ -317,7 +351,9 @@ class TasksPanel(Panel):
         places = _places(name for name in names if name not in RARE)
         rare = _places(name for name in names if name in RARE)
         if rare:
-            places += details("More analyses", rare, kind="more", data_key=f"more.{task}")
+            is_open = not picture.state.page.open.isdisjoint(RARE.intersection(names))
+            places += details("More analyses", rare, kind="more", data_key=f"more.{task}",
+                              open=is_open)  # fmt: skip
         return {
             "tasks": tag("h2", "Tasks", class_="ws-heard")
             + tag("div", tabs, role="tablist", aria_label="Tasks", class_="ws-tabs")
@@ -343,7 +379,8 @@ def build_panels(context: Context) -> list[Panel]:
         TopPanel, overlay.HeadPanel, overlay.LegendPanel, overlay.OrderPanel,
         overlay.ControlsPanel, overlay.ComparePanel, ErrorsPanel, overlay.OverlayPanel, StatePanel,
         PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
-        machine_editor.MachinesDialog, FilesDialog, ReportDialog, HelpDialog, StoryPanel,
+        machine_editor.MachinesDialog, FilesDialog, ReportDialog, StoryPanel,
     )  # fmt: skip
     panels = [kind(context) for kind in kinds]
-    return [*panels, TasksPanel(context, sections), *sections, BestPanel(context)]
+    help_dialog, tasks = HelpDialog(context, sections), TasksPanel(context, sections)
+    return [*panels, help_dialog, tasks, *sections, BestPanel(context)]
