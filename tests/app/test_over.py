@@ -26,6 +26,7 @@ from warpspace.app.state.tree import put
 from warpspace.exceptions import SceneError
 from warpspace.geometry.colour import component_values
 from warpspace.geometry.surfaces import deform
+from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ToleranceSet
 from warpspace.picture.map_mesh import map_mesh
 from warpspace.scene.library import load_scene, parse_scene
@@ -199,3 +200,34 @@ def test_the_difference_is_cut_into_slices_evaluated_where_they_lie():
         # what is drawn are the slices, on the shared scale
         mesh = map_mesh(difference)
         assert len(mesh.values) == sum(part.values.size for part in difference.slices)
+
+
+@pytest.mark.parametrize(
+    ("key", "cause"),
+    [
+        ("EA0Z", "Z is not square to Y"),
+        ("EAY", "Y pitches"),
+        ("ECY", "Y yaws"),
+        ("EAX", "X rolls"),
+        ("EYX", "X is not straight in y"),
+        ("EXX", "of the positioning of X"),
+        ("EA0C", "of the orientation of C about x"),
+    ],
+)
+def test_the_cause_is_named_as_a_fault_of_the_machine(key, cause):
+    assert parameter(key).cause == cause
+
+
+def test_the_heading_is_a_sentence_about_the_largest_error_and_its_main_cause():
+    assert "<h1>Errors up to 51.7 µm<" in pieces(HeadPanel, START)["head"]
+    assert pieces(OrderPanel, START)["head.cause"] == ", mostly because Z is not square to Y"
+    equal = dict.fromkeys(("EXX", "EYY", "EZZ"), 20.0)
+    many = replace(START, amplitudes={**START.zeroed().amplitudes, **equal})
+    assert pieces(OrderPanel, many)["head.cause"].startswith(", partly because ")
+    none = START.zeroed()
+    assert "<h1>No errors<" in pieces(HeadPanel, none)["head"]
+    assert not pieces(OrderPanel, none)["head.cause"]
+    changed = with_sides(START, Side(), scene_side(SECOND))
+    difference = put(changed, "comparison.shown", "difference")
+    assert "<h1>Change up to " in pieces(HeadPanel, difference)["head"]
+    assert not pieces(OrderPanel, difference)["head.cause"]

@@ -157,11 +157,22 @@ class Parameter:
         return "squareness" if self.is_constant else "rotation"
 
     @property
+    def cause(self) -> str:
+        """The error as a reason, to follow "because": ``Z is not square to Y``."""
+        what, _, axis = self.name.partition(" of ")
+        if self.kind is ErrorKind.SQUARENESS and " to " in axis:
+            return axis.replace(" to ", " is not square to ")
+        if what == "straightness":
+            return axis.replace(" in ", " is not straight in ")
+        return f"{axis} {_TURN_VERBS[what]}" if what in _TURN_VERBS else f"of the {self.name}"
+
+    @property
     def label(self) -> str:
         """Label for a control: key, symbol, plain name and unit."""
         return f"{self.key} · {self.symbol} · {self.name} [{self.unit}]"
 
 
+_TURN_VERBS = {"roll": "rolls", "pitch": "pitches", "yaw": "yaws"}
 # By kind and whether the axis is linear: names of an error along or about its axis, and across it.
 _NAMES = {
     (ErrorKind.TRANSLATION, True): ("positioning of {axis}", "straightness of {axis} in {low}"),

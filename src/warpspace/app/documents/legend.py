@@ -130,6 +130,13 @@ def part_html(picture: LivePicture) -> Markup:
 # --- The heading ----------------------------------------------------------------------------------
 
 
+def largest_words(picture: LivePicture) -> str:
+    """Format the heading: ``Errors up to 51.7 µm``."""
+    largest = float(picture.field.norm_um.max())
+    subject = "Change" if picture.is_difference else "Errors"
+    return f"{subject} up to {number(largest)} µm" if largest else f"No {subject.lower()}"
+
+
 def numbers_words(picture: LivePicture) -> str:
     """Format mean and max: ``mean 30.9 µm · max 51.7 µm``; with ± U95 where it is known."""
     norm, change = picture.field.norm_um, "change: " if picture.is_difference else ""

@@ -19,7 +19,7 @@ from warpspace.app.drawing.labels import Label, axis_labels, note_labels, point_
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
-from warpspace.app.evaluation.point_explanation import pick
+from warpspace.app.evaluation.point_explanation import explain_point, pick, pick_worst
 from warpspace.app.panels.conventions import with_travel
 from warpspace.app.panels.design import allowed_words
 from warpspace.app.panels.panel import Context, Panel, Refresh, setting, tiny
@@ -29,14 +29,16 @@ from warpspace.app.state.look import QUANTITIES, SURFACES, slice_positions
 from warpspace.app.state.tree import leaves, put, spell
 from warpspace.geometry.surfaces import corners
 from warpspace.kinematics.model import Loop
-from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection, is_linear
+from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection, is_linear, parameter
 from warpspace.picture.formatting import spell_factor
 from warpspace.picture.map_mesh import isoline_labels
 from warpspace.units import Array, spell_short
 
+MOSTLY = 0.5  # share of the largest error above which its first contribution is most of it
+
 
 class HeadPanel(Panel):
-    """Mean and maximum error, and the place of the maximum."""
+    """Largest error and its main cause; mean and maximum, and the place of the maximum."""
 
     name = "head"
     refresh = Refresh.IMMEDIATE
@@ -44,11 +46,13 @@ class HeadPanel(Panel):
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         subjects, place = legend.subject_words(picture), legend.place_words(picture)
         head = fill(
-            '<div data-piece="reopened"></div><h1>{numbers} <small>{loop}</small></h1>'
-            '<div data-loop="{loop}">{place}<span data-piece="head.kept"></span>'
-            '<span data-piece="head.allowed"></span></div>{words}'
-            '<div data-piece="head.order"></div>',
-            numbers=legend.numbers_words(picture), loop=legend.loop_words(picture), place=place,
+            '<div data-piece="reopened"></div>'
+            '<h1>{largest}<span data-piece="head.cause"></span></h1>'
+            '<div class="ws-numbers"><b>{numbers}</b> <small>{loop}</small></div>'
+            '<div>{place}<span data-piece="head.kept"></span></div>'
+            '<div data-piece="head.allowed"></div>{words}<div data-piece="head.order"></div>',
+            largest=legend.largest_words(picture), numbers=legend.numbers_words(picture),
+            loop=legend.loop_words(picture), place=place,
             words=(tag("p", " · ".join(subjects), class_="ws-subject") if subjects else EMPTY)
             + legend.part_html(picture),
         )  # fmt: skip
@@ -78,7 +82,7 @@ class LegendPanel(Panel):
 
 
 class OrderPanel(Panel):
-    """The errors permitted by the tolerances, second-order remainder, and replaced errors.
+    """Main cause, errors permitted by the tolerances, second order, and replaced errors.
 
     They are too slow to follow a drag.
     """
@@ -92,7 +96,19 @@ class OrderPanel(Panel):
             conditions.append(f"with the errors of this machine; those of “{scene}” are not used")
         allowed = "" if picture.is_difference else allowed_words(picture.drawn_state)
         return {"head.order": tag("p", " · ".join(conditions)) if conditions else EMPTY,
-                "head.allowed": f" · {allowed}" if allowed else ""}  # fmt: skip
+                "head.allowed": allowed, "head.cause": cause_words(picture)}  # fmt: skip
+
+
+def cause_words(picture: LivePicture) -> str:
+    """Name the error that contributes most to the largest one: ``, mostly because …``."""
+    if picture.is_difference or picture.drawn_state.controller or not picture.field.norm_um.any():
+        return ""
+    worst = explain_point(picture.drawn_state, pick_worst(picture), picture.exaggeration)
+    if not worst.ranked or not worst.length_um:
+        return ""
+    first = worst.ranked[0]
+    share = first.along_um / worst.length_um
+    return f", {'mostly' if share > MOSTLY else 'partly'} because {parameter(first.key).cause}"
 
 
 class OverlayPanel(Panel):
