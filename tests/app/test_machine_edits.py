@@ -274,7 +274,7 @@ def test_traces_are_drawn_in_numbers_where_an_error_moves_them():
 def test_a_table_that_is_paused_can_stand_there_and_axes_be_held_at_quarters():
     section = lone_part(machine_editor.RotarySection)
     state = replace(STATE, page=replace(STATE.page, task="machine", open=frozenset({"rotary"})))
-    section.context.stage = SimpleNamespace(playing=False, position={"C": 89.7})
+    section.context.stage = SimpleNamespace(playing=False, position={"C": 89.7}, followers={})
     text = section.body(LIVE.evaluate(state))
     assert 'data-do="state:set.positions.C" data-value="90"' in text
     assert 'data-do="state:set.rotary.held.C" data-value="0,90,180,270"' in text

@@ -20,7 +20,8 @@
       <div class="ws-labels" aria-hidden="true"></div><div class="ws-words" aria-hidden="true"></div>
       <div class="ws-foot"><div class="ws-controls" role="group" aria-label="Display settings"><div data-piece="controls"></div>
         <div data-piece="compare"></div></div>
-      <div class="ws-lengths"><div class="ws-triad" data-piece="triad"></div><div class="ws-bars"></div></div></div></div>
+      <div class="ws-lengths"><div class="ws-triad" data-piece="triad"></div><div class="ws-bars"></div></div>
+      <div class="ws-playback" role="group" aria-label="Playback" data-piece="playback"></div></div></div>
     <section id="ws-story" aria-label="Story" aria-live="polite" data-piece="story"></section>
     <aside id="ws-right" aria-label="Tasks" data-piece="tasks"></aside>
     <aside id="ws-notes" aria-label="Notes" data-piece="notes"></aside>

@@ -9,10 +9,11 @@ from markupsafe import Markup
 from warpspace.analysis.statistics import P95, share_below, share_within, volume_mean
 from warpspace.app.browser.html import EMPTY, fill, join, lowered, number, tag
 from warpspace.app.drawing.camera import CameraMemory
-from warpspace.app.drawing.labels import axis_labels, point_labels
+from warpspace.app.drawing.labels import axis_labels, point_labels, trace_label
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.compare import table_words
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.point_explanation import worst_traced
 from warpspace.app.state.app_state import AppState
 from warpspace.field.evaluate import placed_words, second_order_words
 from warpspace.geometry.colour import ColourScale, component_values
@@ -23,6 +24,10 @@ from warpspace.units import Array, spell_count, spell_short
 
 # --- The colour bar -------------------------------------------------------------------------------
 
+NOTHING_TRACED = (
+    "No error moves the traced points: the dashed circles are nominal. Set an error of a rotary"
+    " axis, for example a tilt, to see the actual traces."
+)
 GEOMETRY_ONLY = "Geometry only: no forces, heat, wear or servo"
 APART = 15.5 / 240.0  # smallest distance of two labels of the colour bar, relative to its height
 _STOPS = 33
@@ -57,6 +62,10 @@ def marks(picture: LivePicture) -> list[LegendMark]:
 
 def marked(picture: LivePicture) -> dict[str, float]:
     field, values = picture.field, picture.values
+    if picture.is_rotary:
+        traced = picture.shown_values
+        mean, largest = (traced.mean(), traced.max()) if traced.size else (0.0, 0.0)
+        return {"mean": float(mean), "max": float(largest)}
     if picture.component != "norm" or picture.quantity == "uncertainty":
         # statistics of the length do not apply to components
         mean = volume_mean(values, picture.grid)
@@ -130,16 +139,27 @@ def part_html(picture: LivePicture) -> Markup:
 # --- The heading ----------------------------------------------------------------------------------
 
 
+def _largest_um(picture: LivePicture) -> float:
+    traced = np.linalg.norm(picture.traced_um, axis=-1)
+    return float(traced.max(initial=0.0) if picture.is_rotary else picture.field.norm_um.max())
+
+
 def largest_words(picture: LivePicture) -> str:
     """Format the heading: ``Errors up to 51.7 µm``."""
-    largest = float(picture.field.norm_um.max())
+    largest = _largest_um(picture)
     subject = "Change" if picture.is_difference else "Errors"
+    if picture.is_rotary:
+        subject = f"{'Change of rotary' if picture.is_difference else 'Rotary'} errors"
     return f"{subject} up to {number(largest)} µm" if largest else f"No {subject.lower()}"
 
 
 def numbers_words(picture: LivePicture) -> str:
     """Format mean and max: ``mean 30.9 µm · max 51.7 µm``; with ± U95 where it is known."""
     norm, change = picture.field.norm_um, "change: " if picture.is_difference else ""
+    if picture.is_rotary:
+        traced = np.linalg.norm(picture.traced_um, axis=-1)
+        mean = float(traced.mean()) if traced.size else 0.0
+        return f"{change}traces: mean {number(mean)} µm · max {number(_largest_um(picture))} µm"
     numbers = {"mean": volume_mean(norm, picture.grid), "max": float(norm.max())}
     uncertainty, u95_texts, factor = picture.uncertainty, dict.fromkeys(numbers, ""), ""
     if uncertainty is not None:
@@ -151,11 +171,25 @@ def numbers_words(picture: LivePicture) -> str:
 
 
 def loop_words(picture: LivePicture) -> str:
+    if picture.is_rotary and not picture.is_difference:
+        loops = dict.fromkeys(of.group.loop for of in picture.traces)
+        return ", ".join(formatting.LOOP_WORDS[loop] for loop in loops)
     return "" if picture.is_difference else formatting.LOOP_WORDS[picture.drawn_state.loop]
 
 
 def place_words(picture: LivePicture) -> str:
-    """Format the place of the max: ``at X 275 Y −225 Z −480``."""
+    """Format the place of the max: ``at X 275 Y −225 Z −480``; of a trace its name and angle."""
+    if picture.is_rotary:
+        if not picture.traced_um.any():
+            return NOTHING_TRACED
+        line, at_deg = worst_traced(picture)
+        points = (
+            f"{name} ({', '.join(map(spell_short, point))}) mm"
+            for point, name in picture.traced_points.items()
+        )
+        name = trace_label(picture, line)
+        angle = f"{line.trace.axis} {number(at_deg, 0)}°"
+        return f"at {angle} of {name} · {', '.join(points)}"
     node = np.unravel_index(int(np.argmax(picture.field.norm_um)), picture.shape)
     positions = picture.grid.coordinates.items()
     at = {name: float(np.broadcast_to(values, picture.shape)[node]) for name, values in positions}

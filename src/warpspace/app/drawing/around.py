@@ -3,6 +3,7 @@
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.drawing.box import coloured_shape
@@ -24,6 +25,7 @@ from warpspace.app.evaluation.machine_bodies import chosen_trace, points_on_trac
 from warpspace.app.evaluation.point_explanation import explain_point, measure_distance
 from warpspace.app.evaluation.scene_overlays import AT_LINE
 from warpspace.formats.source import MAX_LINES
+from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.geometry.surfaces import corners, round_down
 from warpspace.picture.map_mesh import outline_pieces
 from warpspace.units import MM_PER_UM, Array
@@ -45,12 +47,15 @@ ACCENT = (194, 24, 91)  # colour of explanations; not part of any colour map
 RESIDUALS = {True: (138, 143, 152), False: (47, 116, 192)}
 """Colours before the calibration (True) and after, as in the chart."""
 MOST_RESIDUALS = 400
+TRACE_DASH = 0.016  # of the nominal traces of the rotary axes
 HEAD_PART = 0.7  # longest head, relative to its arrow
 STROKES, SLANT = 12, 0.3  # lines of a head, and its radius relative to its length
 
 
 def draw_surroundings(picture: LivePicture) -> Shapes:
     """Draw everything of a picture except the box and the machine."""
+    if picture.is_rotary:
+        return _rotary_traces(picture)
     draws = (_axes, _traces, _path, _part, _program, _other_side, _point, _measured, _marks,
              _uncertainty)  # fmt: skip
     return {name: shape for draw in draws for name, shape in draw(picture).items()}
@@ -87,6 +92,29 @@ def _traces(picture: LivePicture) -> Shapes:
     apart = np.linalg.norm(actual - nominal, axis=-1) > APART * picture.size_mm
     nominal = nominal[apart.any(axis=-1)]
     return {"/traces/others": faint, **_pair(picture, "/traces", nominal, actual)}
+
+
+def _rotary_traces(picture: LivePicture) -> Shapes:
+    """Draw all traces: nominal dashed, actual coloured by its error."""
+    dash = TRACE_DASH * picture.size_mm
+    pieces = [dashes(polylines([*of.nominal_mm]), dash, dash) for of in picture.traces]
+    nominal = np.concatenate([np.zeros((0, 2, 3)), *pieces])
+    shapes: Shapes = {
+        "/traces/nominal": lines(nominal, colour(picture, "trace_nominal"), 1.5),
+    }
+    moved = [line for of in picture.traces if of.error_um.any() for line in of.each()]
+    if moved:
+        drawn = polylines([line.actual_mm for line in moved])
+        errors = polylines([line.error_um for line in moved])
+        values = component_values(errors, picture.component)
+        shapes["/traces/actual"] = lines(drawn, _line_colours(values, picture.scale), 4.0)
+    return shapes
+
+
+def _line_colours(values: Array, scale: ColourScale) -> NDArray[np.uint8]:
+    """Return the colours of the ends of lines, in the range of viser's lines."""
+    linear = np.clip(level_colours(diverging=scale.diverging), 0.0, 1.0)
+    return (255.0 * linear).astype(np.uint8)[colour_levels(scale, values)]
 
 
 def _path(picture: LivePicture) -> Shapes:
@@ -126,9 +154,7 @@ def _program(picture: LivePicture) -> Shapes:
     path = picture.path
     if path is None:
         return {}
-    drawn, (values, scale) = path.drawn_mm(picture.exaggeration), picture.coloured(path)
-    linear = np.clip(level_colours(diverging=scale.diverging), 0.0, 1.0)  # range of viser's lines
-    colours = (255.0 * linear).astype(np.uint8)[colour_levels(scale, values)]
+    drawn, colours = path.drawn_mm(picture.exaggeration), _line_colours(*picture.coloured(path))
     line = index_of(picture.state.forms.get(AT_LINE, ""), MAX_LINES)
     marker = dots(drawn[path.of.line == line][-1:], POINT_MARKER * picture.size_mm, ACCENT)
     pair = _pair(picture, "/program", path.nominal_mm[path.at], drawn[path.at])
@@ -223,7 +249,7 @@ def _uncertainty(picture: LivePicture) -> Shapes:
 
 def turned_points(picture: LivePicture, position: dict[str, float]) -> Shapes:
     """Draw the traced points at a position of the animated axis; none without one."""
-    if not position or not picture.state.shown.traces:
+    if not position or not (picture.state.shown.traces or picture.is_rotary):
         return {}
     size = TURNED * picture.size_mm
     nominal, actual = points_on_traces(picture, position)

@@ -72,6 +72,8 @@ def coloured_shape(
 
 def box(picture: LivePicture) -> Shapes:
     look, options = picture.state.look, picture.state.shown
+    if picture.is_rotary:
+        return {}
     shapes: dict[str, SceneNode | None] = {SURFACE: surface(picture)}
     if look.surface != "grid":
         edges = map_mesh.edge_pieces(picture)
@@ -134,7 +136,7 @@ def only_bent(drawn: LivePicture, picture: LivePicture) -> bool:
         and picture.grid.nominal_mm is drawn.grid.nominal_mm
         and after.look == before.look and after.shown == before.shown
         and not after.look.isolines and not after.look.pass_fail and picture.faded is None
-        and after.look.surface in ("surface", "cut")
+        and after.look.surface in ("surface", "cut") and not picture.is_rotary
     )  # fmt: skip
 
 

@@ -144,7 +144,8 @@ def clipping(position: Array, points: Array, *, orthographic: bool) -> tuple[flo
 
 def focus(state: AppState) -> tuple[object, ...]:
     """Return the properties that require a new camera: scene, chain, display of the machine."""
-    return Identity(state.origin), state.scene.machine.chain, state.machine.shown
+    chain, shown = state.scene.machine.chain, state.machine.shown
+    return Identity(state.origin), chain, shown, state.shows_rotary
 
 
 class TabCamera:
@@ -184,6 +185,11 @@ class TabCamera:
 
     def _room_mm(self, picture: LivePicture) -> Array:
         room = [axes_room_mm(picture)]
+        if picture.is_rotary:
+            bodies = drawn_bodies(picture)
+            traced = (at for of in picture.traces for at in (of.nominal_mm, of.actual_mm))
+            points = [*(part.vertices_mm for part in bodies), *(at.reshape(-1, 3) for at in traced)]
+            return np.concatenate(points)
         if picture.state.machine.shown:
             bodies = drawn_bodies(picture, nominal=True)
             room = [picture.grid.bounds_mm, *(part.vertices_mm for part in bodies)]

@@ -19,6 +19,7 @@ from warpspace.geometry.colour import tick_values
 from warpspace.geometry.surfaces import corners, is_thin
 from warpspace.machine.axes import is_linear, parameter
 from warpspace.picture import formatting
+from warpspace.picture.traces import TraceLine
 from warpspace.units import MICROMETRE, MINUS, MM_PER_UM, Array
 
 AWAY = 0.13
@@ -96,7 +97,8 @@ def axes_room_mm(picture: LivePicture) -> Array:
 
 def axis_labels(picture: LivePicture) -> list[Label]:
     state = picture.state
-    if not state.shown.axes or state.machine.shown:  # numbers would cover the machine
+    hidden = state.machine.shown or picture.is_rotary
+    if not state.shown.axes or hidden:  # numbers would cover the machine
         return []
     return _axis_labels(axes(picture), TICK * picture.size_mm)
 
@@ -119,7 +121,9 @@ def _spell(value: float, unit: str = MICROMETRE, plus_minus: str = "") -> str:
 
 
 def point_labels(picture: LivePicture) -> list[Label]:
-    """List the labels of points of the volume, by priority."""
+    """List the labels of points of the volume or of the traces, by priority."""
+    if picture.is_rotary:
+        return [*_traces(picture)]
     worst, point = [*_worst(picture)], [*_point(picture)]
     for label, other in zip(worst, point, strict=False):
         distance = np.linalg.norm(label.at_mm - other.at_mm)
@@ -127,6 +131,21 @@ def point_labels(picture: LivePicture) -> list[Label]:
         if same_text and distance < TICK * picture.size_mm:
             worst = []
     return [*worst, *point, *_measured(picture), *_names(picture), *_corners(picture)]
+
+
+def trace_label(picture: LivePicture, line: TraceLine) -> str:
+    """Name a trace by its point: ``P1 over C at B −30°``."""
+    name = picture.traced_points[line.trace.point_mm]
+    return f"{name} {line.trace.label}".replace("-", MINUS)
+
+
+def _traces(picture: LivePicture) -> Iterator[Label]:
+    """Name each trace at its largest error, the largest first."""
+    for line in sorted(picture.moved_traces.values(), key=lambda line: -line.largest_um):
+        worst = int(np.argmax(np.linalg.norm(line.error_um, axis=-1)))
+        yield Label(
+            f"{trace_label(picture, line)}: {_spell(line.largest_um)}", line.actual_mm[worst]
+        )
 
 
 def _worst(picture: LivePicture) -> Iterator[Label]:

@@ -13,7 +13,13 @@ from warpspace.app.drawing.around import GIZMO, draw_surroundings, turned_points
 from warpspace.app.drawing.colours import Rgb, colour
 from warpspace.app.drawing.shapes import SCENE_PER_MM, Nodes, SceneNode, Shapes, ball, lines, mesh
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine_bodies import drawn_bodies, played_position, tool_point
+from warpspace.app.evaluation.machine_bodies import (
+    drawn_bodies,
+    played_angle,
+    played_axis,
+    played_position,
+    tool_point,
+)
 from warpspace.app.evaluation.scene_overlays import moved_place
 from warpspace.app.state.leaf import Identity
 from warpspace.bodies.placed import PlacedBody
@@ -21,7 +27,7 @@ from warpspace.kinematics import transforms
 
 STEP_S = 0.125  # between two pictures of a rotating table; each is sent to the page
 LONGEST_STEP_S = 0.5  # longer delays are skipped
-SPEED_DEG_S = 30.0
+SPEEDS_DEG_S = (10.0, 30.0, 90.0)
 
 BALL = 0.010  # marker of the tool point, relative to the longest edge
 OPACITY = 0.045
@@ -35,11 +41,11 @@ def machine(picture: LivePicture, turned: Mapping[str, float]) -> Shapes:
     the machine is hidden.
     """
     is_shown, shapes = picture.state.machine.shown, dict[str, SceneNode | None]()
-    if is_shown or turned:
+    if is_shown or turned or picture.is_rotary:
         edge = colour(picture, "body_edge")
         for part in drawn_bodies(picture, turned):
             shapes |= _body("/machine", part, part.body.colour, edge)
-    if is_shown:
+    if is_shown and not picture.is_rotary:
         at, size = tool_point(picture)[0], BALL * picture.size_mm
         shapes["/machine/tool_point"] = ball(at, size, colour(picture, "edge"))
     return shapes
@@ -70,8 +76,10 @@ class MovingLayer:
         self._around = Nodes(client.scene, page)
         self._ghost, self._turning = Nodes(client.scene), Nodes(client.scene)
         self._ghost_of: object = None
-        self.position: dict[str, float] = {}  # of the animated axis, degrees; empty while stopped
-        self.moved: Callable[[], None] = lambda: None
+        self.position: dict[str, float] = {}  # of animated axes, degrees; empty while stopped
+        self.followers: dict[str, Callable[[], None]] = {}  # called after each step, by panel
+        self.axis: str | None = None  # the axis that plays
+        self.speed_deg_s = SPEEDS_DEG_S[1]
         self.clamp: Callable[[str], None] = lambda _place: None  # called after a drag
         self._turned_deg = 0.0
         self._turned_at: float | None = None  # None while stopped
@@ -108,9 +116,9 @@ class MovingLayer:
 
     def _draw_ghost(self, picture: LivePicture) -> None:
         state = picture.state
-        on = state.machine.ghost and not state.machine.shown
+        on = state.machine.ghost and not state.machine.shown and not picture.is_rotary
         of = on and (
-            Identity(state.scene), state.view_key, state.shown.dark,
+            Identity(state.scene), state.view_key, state.shown.dark, state.shows_rotary,
             Identity(state.machine.linear_mm), Identity(state.positions),
         )  # fmt: skip
         if of != self._ghost_of:
@@ -125,9 +133,14 @@ class MovingLayer:
     def playing(self) -> bool:
         return self._turned_at is not None
 
-    def play(self, on: bool | None) -> None:
-        """Play (True), pause (False), or return to the position of the axis (None)."""
+    def play(self, on: bool | None, axis: str | None = None) -> None:
+        """Play an axis (True), pause (False), or return to the axis positions (None)."""
         if on:
+            state = self._picture.state
+            self.axis = axis or played_axis(state)
+            at = self.position.get(self.axis or "")
+            if axis != self.axis or at is not None:
+                self._turned_deg = played_angle(state, self.axis, at)
             self._turned_at = time.monotonic()
             return
         self._turned_at = None
@@ -135,7 +148,16 @@ class MovingLayer:
             self._turned_deg = 0.0
             self._stand({}, drawn=True)
         else:
-            self.moved()
+            self._moved()
+
+    def scrub(self, axis: str, at_deg: float) -> None:
+        """Move an axis to a position by hand, which ends playing."""
+        self._turned_at = None
+        self._stand({**self.position, axis: at_deg}, drawn=True)
+
+    def _moved(self) -> None:
+        for follow in self.followers.values():
+            follow()
 
     @property
     def wait_s(self) -> float | None:
@@ -146,12 +168,14 @@ class MovingLayer:
     def turn(self) -> None:
         now = time.monotonic()
         since = min(now - (self._turned_at or now), LONGEST_STEP_S)
-        self._turned_deg, self._turned_at = (self._turned_deg + SPEED_DEG_S * since) % 360.0, now
-        self._stand(played_position(self._picture.state, self._turned_deg), drawn=True)
+        self._turned_deg = (self._turned_deg + self.speed_deg_s * since) % 360.0
+        self._turned_at = now
+        played = played_position(self._picture.state, self._turned_deg, self.axis)
+        self._stand({**self.position, **played}, drawn=True)
 
     def _stand(self, position: dict[str, float], *, drawn: bool = False) -> None:
         self.position = position
         if drawn:
             with self._client.atomic():
                 self._draw_turning()
-        self.moved()
+        self._moved()

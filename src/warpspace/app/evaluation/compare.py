@@ -119,7 +119,9 @@ def _shared_scale(state: AppState, maps: Sequence[LivePicture]) -> ColourScale:
     if state.look.range_mode == "fixed":
         return maps[0].scale
     widest = max((picture.scale for picture in maps), key=lambda scale: scale.high)
-    shared = choose_scale([picture.values for picture in maps], state.component, maps[0].quantity)
+    shared = choose_scale(
+        [picture.shown_values for picture in maps], state.component, maps[0].quantity
+    )
     return shared if shared.high > widest.high else widest
 
 

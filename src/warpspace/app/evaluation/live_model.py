@@ -51,12 +51,16 @@ class LiveModel:
         key = _place(state), rotary.off, rotary.own_mm, tuple(rotary.held.items())
         response: Response = self._cache.get(key, lambda: _build(state), _size)
         (grid, basis), *traces = response
-        field = self._field(state, grid, basis)
-        size = model.picture_size_mm(state.scene, grid)
-        factor = model.choose_exaggeration(
-            state.exaggeration, None, float(field.norm_um.max()), size
+        field, size = self._field(state, grid, basis), model.picture_size_mm(state.scene, grid)
+        errors = [self._field(state, group, own).error_um for group, own in traces]
+        drawn = errors if state.shows_rotary else [field.error_um]
+        largest = max(
+            (float(np.linalg.norm(e, axis=-1).max(initial=0.0)) for e in drawn), default=0
         )
+        factor = model.choose_exaggeration(state.exaggeration, None, largest, size)
         uncertainty, quantity = self._uncertainty(state, grid, field), state.look.quantity
+        if state.shows_rotary:
+            quantity = "position"
         if quantity == "uncertainty" and not (uncertainty and uncertainty.errors.is_known):
             quantity = "position"
         common: dict[str, Any] = {
@@ -69,8 +73,8 @@ class LiveModel:
         if state.look.pass_fail and (state.component, quantity) == ("norm", "position"):
             common["limit_um"] = state.specification.limit_um
         traced = tuple(
-            TraceLines(group, own.nominal_mm, self._field(state, group, own).error_um, factor)
-            for group, own in traces
+            TraceLines(group, own.nominal_mm, error, factor)
+            for (group, own), error in zip(traces, errors, strict=True)
         )
         picture = LivePicture(
             **common,
@@ -181,10 +185,13 @@ class PassFail(ColourScale):
         return (self.low, self.limit, self.high)
 
 
-def _chosen_colours(state: AppState, volume: model.Picture, basis: ErrorBasis) -> ColourScale:
+def _chosen_colours(state: AppState, volume: LivePicture, basis: ErrorBasis) -> ColourScale:
     """Return the selected colour scale: fixed, shared, or with round ends."""
     quantity, component, look = volume.quantity, state.component, state.look
-    field, values = volume.field, volume.values
+    field, values = volume.field, volume.shown_values
+    if state.shows_rotary:
+        end = look.range_top if look.range_mode == "fixed" else None
+        return model.choose_scale([values], component, end=end)
     if look.pass_fail and quantity == "position" and component == "norm":
         scale, limit = model.choose_scale([values], component), state.specification.limit_um
         top = max(scale.high, limit)

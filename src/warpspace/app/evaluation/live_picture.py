@@ -18,6 +18,7 @@ from warpspace.app.evaluation.scene_overlays import (
 from warpspace.app.state.app_state import AppState
 from warpspace.bench.base import BenchTest
 from warpspace.geometry.colour import ColourScale, component_values
+from warpspace.machine.definition import Vector
 from warpspace.parts.program import ToolPath
 from warpspace.parts.workpiece import Workpiece
 from warpspace.picture.model import Picture, choose_scale, picture_size_mm
@@ -98,11 +99,33 @@ class LivePicture(Picture):
         return int(np.argmax(np.abs(self.values)))
 
     @cached_property
+    def traced_points(self) -> Mapping[Vector, str]:
+        """Short names of the traced points, P1, P2 and so on."""
+        traces = (trace for of in self.traces for trace in of.group.traces)
+        points = dict.fromkeys(trace.point_mm for trace in traces)
+        return {point: f"P{number}" for number, point in enumerate(points, 1)}
+
+    @cached_property
     def moved_traces(self) -> Mapping[str, TraceLine]:
-        if not self.state.shown.traces:
+        if not self.state.shown.traces and not self.is_rotary:
             return {}
         lines = (line for of in self.traces if of.error_um.any() for line in of.each())
         return {name_trace(line.trace): line for line in lines if is_moved(line)}
+
+    @property
+    def is_rotary(self) -> bool:
+        """True where the rotary axes are drawn, not the volume."""
+        return self.state.shows_rotary
+
+    @cached_property
+    def traced_um(self) -> Array:
+        """Errors of all points of the traces, [n, 3], µm."""
+        return np.concatenate([np.zeros((0, 3)), *(t.error_um.reshape(-1, 3) for t in self.traces)])
+
+    @cached_property
+    def shown_values(self) -> Array:
+        """Coloured values of what is drawn: of the volume, or of the traces."""
+        return component_values(self.traced_um, self.component) if self.is_rotary else self.values
 
     @property
     def drawn_state(self) -> AppState:

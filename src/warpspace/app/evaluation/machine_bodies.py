@@ -39,7 +39,8 @@ def drawn_bodies(
     state, scene = picture.state, picture.state.scene
     positions, _ = standing(state, turned)
     factor = picture.exaggeration if state.machine.bent and not nominal else 0.0
-    only = None if state.machine.shown or nominal else _turning_frames(state)
+    whole = nominal or (state.machine.shown and not state.shows_rotary)
+    only = None if whole else _turning_frames(state)
     return place_bodies(
         scene, state.view(), factor, only, amplitudes=state.active, positions=positions
     )
@@ -65,17 +66,31 @@ def _turning_frames(state: AppState) -> tuple[str, ...]:
     return ()
 
 
+def rotary_axes(state: AppState) -> tuple[str, ...]:
+    """List the rotary axes that are drawn: of the workpiece side, or else of the tool side."""
+    return _turning_frames(state)[:-1]
+
+
 def played_axis(state: AppState) -> str | None:
     """Return the rotary axis next to the workpiece, or to the tool; None where there is none."""
     return next(iter(_turning_frames(state)[-2:]), None)
 
 
-def played_position(state: AppState, angle_deg: float) -> dict[str, float]:
+def played_angle(state: AppState, axis: str | None, at_deg: float | None) -> float:
+    """Return the angle after which `played_position` is at a position of an axis, degrees."""
+    if axis is None or at_deg is None:
+        return 0.0
+    low, high = state.scene.machine.axes[axis].travel
+    start, span = state.positions.get(axis, low), high - low
+    return at_deg - start if span >= 360.0 else 180.0 * (at_deg - start) / (span or 1.0)
+
+
+def played_position(state: AppState, angle_deg: float, axis: str | None = None) -> dict[str, float]:
     """Return the position of the animated axis after an angle, degrees, within its travel.
 
     An axis without full rotation oscillates over its travel.
     """
-    axis = played_axis(state)
+    axis = axis or played_axis(state)
     if axis is None:
         return {}
     low, high = state.scene.machine.axes[axis].travel

@@ -25,7 +25,7 @@ from warpspace.kinematics.model import Coordinates, Loop
 from warpspace.machine.axes import is_linear
 from warpspace.picture.formatting import spell_at
 from warpspace.picture.map_mesh import solid_map
-from warpspace.picture.traces import is_moved
+from warpspace.picture.traces import TraceLine, is_moved
 from warpspace.units import Array
 
 TOLERANCE_RAD = 0.0032  # from a click to a trace: about seven pixels of the default view
@@ -79,8 +79,26 @@ def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> tuple[Pick
     return picked, origin + distance * unit
 
 
+def worst_traced(picture: LivePicture) -> tuple[TraceLine, float]:
+    """Return the trace with the largest error, and the position of its axis there, degrees."""
+    found: tuple[float, TraceLine, float] | None = None
+    for of in picture.traces:
+        for number, line in enumerate(of.each()):
+            if found is None or line.largest_um > found[0]:
+                node = int(np.argmax(np.linalg.norm(line.error_um, axis=-1)))
+                at = float(of.group.coordinates[line.trace.axis][number][node])
+                found = line.largest_um, line, at
+    if found is None:
+        raise ValueError("no traces")
+    return found[1], found[2]
+
+
 def pick_worst(picture: LivePicture) -> Picked:
-    """Return the node with the largest position error of the picture."""
+    """Return the node, or the traced point, with the largest position error of the picture."""
+    if picture.is_rotary and picture.traced_um.any():
+        line, at = worst_traced(picture)
+        loop, trace = line.loop, line.trace
+        return Picked({**trace.at, trace.axis: at}, loop, trace.point_mm)
     axes = picture.statistics.max_at_axes
     return Picked(
         {name: at for name, at in axes.items() if is_linear(name) or name in picture.grid.axes}

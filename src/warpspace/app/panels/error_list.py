@@ -24,7 +24,8 @@ from warpspace.app.state.leaf import Identity, Span
 from warpspace.app.state.tree import put
 from warpspace.app.state.typed_numbers import comma_rows, read_rows, spell_typed
 from warpspace.exceptions import OptionError, UnknownNameError
-from warpspace.machine.axes import ErrorKind, Parameter, parameter
+from warpspace.field.evaluate import build_basis
+from warpspace.machine.axes import ErrorKind, Parameter, is_linear, parameter
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.registry import CurveKind, curve_kind, curve_kinds
 from warpspace.machine.curves.simple import Constant
@@ -455,11 +456,23 @@ def _spans(state: AppState) -> dict[str, Span]:
 
 
 def _gains(picture: LivePicture, state: AppState) -> dict[str, float]:
-    """Compute the RMS effect of a unit of each error over the volume, µm."""
+    """Compute the RMS effect of a unit of each error, µm.
+
+    Over the volume; of an error of a rotary axis over its traces where that is more.
+    """
     basis = grid_basis(state.scene, picture.grid, picture.view)
     squares = np.sum(basis.position**2, axis=-1).reshape(len(basis.keys), -1)
     rms = np.sqrt(squares @ picture.grid.weights.reshape(-1))
-    return dict(zip(basis.keys, rms.tolist(), strict=True))
+    gains = dict(zip(basis.keys, rms.tolist(), strict=True))
+    scene = state.scene
+    for of in picture.traces:
+        keys = [key for key in basis.keys if not is_linear(parameter(key).axis)]
+        at, view = of.group.coordinates, state.view(of.group.loop)
+        traced = build_basis(scene.model, scene.errors, keys, at, view, of.group.nominal_mm)
+        squares = np.sum(traced.position**2, axis=-1).reshape(len(keys), -1).mean(axis=1)
+        for key, square in zip(keys, squares.tolist(), strict=True):
+            gains[key] = max(gains[key], float(np.sqrt(square)))
+    return gains
 
 
 # --- Search of error parameters by key, symbol, name, axis and kind -------------------------------

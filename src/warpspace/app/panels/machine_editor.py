@@ -93,7 +93,7 @@ class RotarySection(panel.Section):
         if axis is None:
             return panel.quiet("This machine has no rotary axis.")
         if stage is not None:
-            stage.moved = self._follow
+            stage.followers[self.name] = self._follow
         buttons = [button("Pause" if playing else f"Turn {axis}", "rotary:play",
                           hint="Animate the traced points")]  # fmt: skip
         if playing or position:
@@ -133,7 +133,9 @@ def _trace(picture: LivePicture) -> Markup:
     chosen = html.field("Trace", html.choice(path, name, {trace: trace for trace in moved}), path)
     motions = {trace: motion_of(picture, moved[trace]) for trace in [*moved][:MOST_ROWS]}
     motion = motions[name] if name in motions else motion_of(picture, moved[name])
-    motion_plots = _motion(motion, name) if motion else panel.quiet(ON_THE_AXIS)
+    motion_plots = (
+        _motion(motion, name, large=picture.is_rotary) if motion else panel.quiet(ON_THE_AXIS)
+    )
     head = join(fill("<th>{} <small>{}</small></th>", *heading) for heading in HEADS.items())
     table = tag("table", tag("tr", head) + join(starmap(_numbers, motions.items())))
     return chosen + motion_plots + panel.details("Table of all traces", panel.tiny(AVERAGE), table)
@@ -169,14 +171,15 @@ def _of_state(state: AppState, line: TraceLine) -> AxisMotion | None:
     return evaluate_axis_motion(replace(state.active_scene(), trace_points_mm=points), line)
 
 
-def _motion(motion: AxisMotion, name: str) -> Markup:
+def _motion(motion: AxisMotion, name: str, *, large: bool) -> Markup:
     plots, notes = list[Markup](), list[Markup]()
     for part in motion.motions:
         chart = motion_lines(part.name, motion, part)
         plots.append(block_html(replace(chart, title=part.name, note="")))
         notes.append(panel.tiny(f"{part.iso}: {chart.note}."))
     label = f"Error motion of {name}"
-    drawn = tag("div", join(plots), class_="ws-plots", role="group", aria_label=label)
+    kind = "ws-plots large" if large else "ws-plots"
+    drawn = tag("div", join(plots), class_=kind, role="group", aria_label=label)
     return join((drawn, fill(KEY), *notes, panel.tiny(ABOUT)))
 
 

@@ -25,7 +25,7 @@ from warpspace.app.panels.design import allowed_words
 from warpspace.app.panels.panel import Context, Panel, Refresh, setting, tiny
 from warpspace.app.state.app_state import COMPARISON_VIEWS, COMPONENT_NAMES, NOBODY, AppState, Side
 from warpspace.app.state.leaf import Identity
-from warpspace.app.state.look import QUANTITIES, SURFACES, slice_positions
+from warpspace.app.state.look import DRAWINGS, QUANTITIES, SURFACES, slice_positions
 from warpspace.app.state.tree import leaves, put, spell
 from warpspace.geometry.surfaces import corners
 from warpspace.kinematics.model import Loop
@@ -54,9 +54,18 @@ class HeadPanel(Panel):
             largest=legend.largest_words(picture), numbers=legend.numbers_words(picture),
             loop=legend.loop_words(picture), place=place,
             words=(tag("p", " · ".join(subjects), class_="ws-subject") if subjects else EMPTY)
-            + legend.part_html(picture),
+            + (EMPTY if picture.is_rotary else legend.part_html(picture)) + _rotary_offer(picture),
         )  # fmt: skip
         return {"head": head}
+
+
+def _rotary_offer(picture: LivePicture) -> Markup:
+    """Offer the drawing of the rotary axes after a change of an error of one."""
+    axis = parameter(picture.state.page.row).axis if picture.state.page.row else ""
+    if picture.is_rotary or not axis or is_linear(axis):
+        return EMPTY
+    show = button("show its traces", "controls:drawing", "rotary", kind="link")
+    return tag("p", join((f"{axis} is a rotary axis: ", show)))
 
 
 class LegendPanel(Panel):
@@ -70,7 +79,7 @@ class LegendPanel(Panel):
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         limit_menu = EMPTY
-        if not picture.is_difference:
+        if not picture.is_difference and not picture.is_rotary:
             share, is_pass = legend.within_limit_words(picture)
             name, limit = "specification.limit_um", f"{picture.state.specification.limit_um:g}"
             box = text_box(f"state:set.{name}", limit, size="short", label="Limit", id="ws-limit")
@@ -94,14 +103,16 @@ class OrderPanel(Panel):
         conditions, scene = [*legend.order_conditions(picture)], picture.state.left_behind
         if scene:
             conditions.append(f"with the errors of this machine; those of “{scene}” are not used")
-        allowed = "" if picture.is_difference else allowed_words(picture.drawn_state)
+        of_volume = not picture.is_difference and not picture.is_rotary
+        allowed = "" if not of_volume else allowed_words(picture.drawn_state)
         return {"head.order": tag("p", " · ".join(conditions)) if conditions else EMPTY,
                 "head.allowed": allowed, "head.cause": cause_words(picture)}  # fmt: skip
 
 
 def cause_words(picture: LivePicture) -> str:
     """Name the error that contributes most to the largest one: ``, mostly because …``."""
-    if picture.is_difference or picture.drawn_state.controller or not picture.field.norm_um.any():
+    errors = picture.traced_um if picture.is_rotary else picture.field.error_um
+    if picture.is_difference or picture.drawn_state.controller or not errors.any():
         return ""
     worst = explain_point(picture.drawn_state, pick_worst(picture), picture.exaggeration)
     if not worst.ranked or not worst.length_um:
@@ -261,8 +272,8 @@ class ControlsPanel(Panel):
         triad = html.fill(
             '<svg data-piece="triad.axes" viewBox="-46 -46 92 92" aria-hidden="true"></svg>'
         )
-        menus = (_exaggeration(picture), _colours(picture), _surface(picture),
-                 _machine(picture.state))  # fmt: skip
+        of_volume = () if picture.is_rotary else (_surface(picture), _machine(picture.state))
+        menus = (_drawings(picture.state), _exaggeration(picture), _colours(picture), *of_volume)
         return {
             "controls": join(menus),
             "triad": html.menu(triad, _picks("controls:view", VIEWS, camera.view) + lens,
@@ -282,6 +293,12 @@ class ControlsPanel(Panel):
         if action == "machine" and value in MACHINES:
             machine = replace(state.machine, shown=value == "solid", ghost=value != "off")
             return replace(state, machine=machine)
+        if action == "drawing" and value in DRAWINGS:
+            state = put(state, "look.drawing", value)
+            if value == "volume":
+                return state
+            opened = state.page.open | {"rotary"}
+            return replace(state, page=replace(state.page, task="machine", open=opened))
         if action == "set.travel":
             return with_travel(state, value)
         view = value if action == "view" and value in VIEWS else None
@@ -290,6 +307,19 @@ class ControlsPanel(Panel):
             context.call_soon(lambda: context.fit_view(view, lens))
             context.call_soon(self.rerender)
         return state
+
+
+def _drawings(state: AppState) -> Markup:
+    """Render the switch of the drawing: volume or rotary axes; empty without rotary axes."""
+    if all(map(is_linear, state.scene.machine.axes)):
+        return EMPTY
+    chosen = "rotary" if state.shows_rotary else "volume"
+    chips = (
+        button(label.capitalize(), "controls:drawing", key, kind="chip", pressed=key == chosen,
+               hint=f"Draw the {label}")
+        for key, label in DRAWINGS.items()
+    )  # fmt: skip
+    return tag("div", join(chips), class_="ws-drawings", role="group", aria_label="Drawing")
 
 
 def _exaggeration(picture: LivePicture) -> Markup:

@@ -22,6 +22,7 @@ from warpspace.app.panels.improve import AdjustPanel, BestPanel, CompensatePanel
 from warpspace.app.panels.measurement import CalibratePanel, TestsPanel
 from warpspace.app.panels.note_panels import NoteNumbersPanel, NotesPanel, StoryPanel
 from warpspace.app.panels.panel import Context, Dialog, Panel, Refresh, Section, details, quiet
+from warpspace.app.panels.playback import PlaybackPanel
 from warpspace.app.panels.upload_panels import ImportPanel, PartPanel, ProgramPanel
 from warpspace.app.state.app_state import AppState, Exclusions
 from warpspace.app.state.look import TASKS
@@ -153,6 +154,9 @@ COMMANDS = (
     Command("Exaggeration: true scale", "state:set.exaggeration", "1", ("t",)),
     Command("Grid lines on or off", "page:toggle", "grid_lines", ("g",)),
     Command("Nominal box on or off", "page:toggle", "ghost", ("b",)),
+    Command("Draw the volume", "controls:drawing", "volume", ("v",)),
+    Command("Draw the rotary axes", "controls:drawing", "rotary", ("r",), "table traces"),
+    Command("Play or pause the rotary axis", "playback:play", keys=("p",)),
     Command("Rotary traces on or off", "page:toggle", "traces", ("c",)),
     Command("Dark mode on or off", "page:toggle", "dark", ("m",)),
     Command("Set all errors to zero", "page:zero", keys=("ctrl+alt+0",)),
@@ -377,8 +381,8 @@ def build_panels(context: Context) -> list[Panel]:
     ]
     kinds = (
         TopPanel, overlay.HeadPanel, overlay.LegendPanel, overlay.OrderPanel,
-        overlay.ControlsPanel, overlay.ComparePanel, ErrorsPanel, overlay.OverlayPanel, StatePanel,
-        PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
+        overlay.ControlsPanel, PlaybackPanel, overlay.ComparePanel, ErrorsPanel,
+        overlay.OverlayPanel, StatePanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
         machine_editor.MachinesDialog, FilesDialog, ReportDialog, StoryPanel,
     )  # fmt: skip
     panels = [kind(context) for kind in kinds]

@@ -25,7 +25,7 @@ from warpspace.app.state.look import (
 from warpspace.exceptions import WarpspaceError
 from warpspace.field.evaluate import View
 from warpspace.kinematics.model import Loop
-from warpspace.machine.axes import parameter
+from warpspace.machine.axes import is_linear, parameter
 from warpspace.machine.definition import Vector
 from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, ToleranceSet
 from warpspace.machine.limits import EXAGGERATION as FACTORS
@@ -321,6 +321,11 @@ class AppState:
     @property
     def position_spans(self) -> Mapping[str, Span]:
         return position_spans(self.scene)
+
+    @property
+    def shows_rotary(self) -> bool:
+        """True where the rotary axes are drawn, not the volume."""
+        return self.look.drawing == "rotary" and not all(map(is_linear, self.scene.machine.axes))
 
     @property
     def origin(self) -> Scene:

@@ -17,6 +17,7 @@ SURFACES = {
     "slices": "slices",
     "grid": "grid lines only",
 }
+DRAWINGS = {"volume": "volume", "rotary": "rotary axes"}
 QUANTITIES = {
     "position": "position error [µm]",
     "orientation": "tool-orientation error [µrad]",
@@ -31,6 +32,9 @@ TASKS = {word.lower(): word for word in ("Understand", "Measure", "Improve", "De
 
 @dataclass(frozen=True, slots=True)
 class Look:
+    drawing: str = described(
+        "volume", "Drawing", choices=DRAWINGS, hint="The working volume, or the rotary axes."
+    )
     surface: str = described("surface", "Surface", choices=SURFACES)
     quantity: str = described("position", "Quantity", choices=QUANTITIES)
     # round ends of the present values; `range_top`; or one range for all components of the present

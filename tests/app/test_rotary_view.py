@@ -1,0 +1,171 @@
+"""The drawing of the rotary axes: what it shows, against closed forms, and its playback."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.parts import LIVE, Alone, lone_part
+from warpspace.app.documents import legend
+from warpspace.app.drawing.around import draw_surroundings
+from warpspace.app.drawing.box import box
+from warpspace.app.drawing.labels import axis_labels, point_labels
+from warpspace.app.evaluation.machine_bodies import played_angle, played_position
+from warpspace.app.panels.error_list import _gains
+from warpspace.app.panels.overlay import ControlsPanel, HeadPanel, OrderPanel
+from warpspace.app.panels.playback import PlaybackPanel
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.tree import put
+from warpspace.scene.library import load_scene
+
+FIRST = load_scene("dvf5000_first")
+START = start_state(FIRST, nodes=5)
+ROTARY = put(START.zeroed(), "look.drawing", "rotary")
+
+
+class Stage:
+    """A stage that records what the bar asks of it."""
+
+    def __init__(self):
+        self.followers, self.position, self.playing, self.axis = {}, {}, False, None
+        self.speed_deg_s, self.asked = 30.0, []
+
+    def play(self, on, axis=None):
+        self.asked.append(("play", on, axis))
+        self.playing, self.axis = bool(on), axis
+
+    def scrub(self, axis, at_deg):
+        self.asked.append(("scrub", axis, at_deg))
+        self.position = {**self.position, axis: at_deg}
+
+
+def test_a_tilt_of_c_moves_the_traces_by_its_angle_and_their_height():
+    """A rotation of 20 µrad about y moves (x, y, z) by 20e-6 · (z, 0, −x), seen in its table."""
+    picture = LIVE.evaluate(ROTARY.with_amplitude("EB0C", 20.0))
+    (point,) = [p for p, name in picture.traced_points.items() if name == "P1"]
+    of = picture.traces[0]
+    number = next(
+        i for i, t in enumerate(of.group.traces) if t.axis == "C" and t.point_mm == point
+        and t.at["B"] == 0.0
+    )  # fmt: skip
+    x, _, z = of.group.nominal_mm[number].T
+    assert np.ptp(z) < 1e-9
+    assert np.allclose(of.error_um[number][:, 2], -0.020 * x, atol=1e-9)
+    assert np.allclose(of.error_um[number][:, 0], of.error_um[number][0, 0], atol=1e-9)
+
+
+def test_the_heading_the_legend_and_the_colours_are_those_of_the_traces():
+    picture = LIVE.evaluate(ROTARY.with_amplitude("EB0C", 20.0))
+    norms = np.concatenate(
+        [np.linalg.norm(of.error_um, axis=-1).reshape(-1) for of in picture.traces]
+    )
+    assert legend.largest_words(picture) == f"Rotary errors up to {norms.max():.1f} µm"
+    words = f"traces: mean {norms.mean():.1f} µm · max {norms.max():.1f} µm"
+    assert legend.numbers_words(picture) == words
+    assert legend.marked(picture) == pytest.approx({"mean": norms.mean(), "max": norms.max()})
+    assert picture.scale.high >= norms.max() > 0.4 * picture.scale.high
+    assert "P2 over C at B −30°" in legend.place_words(picture)
+    assert "P1 (275, 0, 0) mm, P2 (0, 275, 450) mm" in legend.place_words(picture)
+    part = lone_part(OrderPanel)
+    assert part.render(picture)["head.cause"] == (
+        ", mostly because of the orientation of C about y"
+    )
+
+
+def test_it_has_its_own_exaggeration():
+    loud = replace(START, amplitudes={**START.amplitudes, "EB0C": 2.0})
+    volume, rotary = (
+        LIVE.evaluate(put(loud, "look.drawing", drawing)) for drawing in ("volume", "rotary")
+    )
+    assert rotary.exaggeration > volume.exaggeration
+    fixed = put(put(loud, "exaggeration", "700"), "look.drawing", "rotary")
+    assert LIVE.evaluate(fixed).exaggeration == 700.0
+
+
+def test_the_volume_is_hidden_and_all_traces_are_drawn():
+    picture = LIVE.evaluate(ROTARY.with_amplitude("EXC", 5.0))
+    assert box(picture) == {}
+    assert axis_labels(picture) == []
+    shapes = draw_surroundings(picture)
+    assert set(shapes) == {"/traces/nominal", "/traces/actual"}
+    assert len(point_labels(picture)) == len(picture.moved_traces) > 0
+    plain = LIVE.evaluate(put(ROTARY, "look.drawing", "volume"))
+    assert box(plain)
+
+
+def test_without_rotary_errors_the_nominal_circles_are_drawn_and_it_says_why():
+    picture = LIVE.evaluate(ROTARY)
+    assert set(draw_surroundings(picture)) == {"/traces/nominal"}
+    html = lone_part(HeadPanel).render(picture)["head"]
+    assert "No rotary errors" in html
+    assert "the dashed circles are nominal" in html
+
+
+def test_a_machine_without_rotary_axes_has_no_switch():
+    mill = start_state(load_scene("machine_gantry_mill"), nodes=5)
+    state = put(mill, "look.drawing", "rotary")
+    assert not state.shows_rotary
+    assert box(LIVE.evaluate(state))
+
+
+def test_the_switch_opens_the_polar_plots():
+    part = Alone(ControlsPanel, START).part
+    state = part.handle(START, "drawing", "rotary")
+    assert state.shows_rotary
+    assert state.page.task == "machine"
+    assert "rotary" in state.page.open
+    assert not part.handle(state, "drawing", "volume").shows_rotary
+    assert part.handle(START, "drawing", "<b>") is START
+
+
+def test_a_change_of_a_rotary_error_offers_the_drawing():
+    part = lone_part(HeadPanel)
+    changed = put(START, "page.row", "EB0C")
+    assert "C is a rotary axis" in part.render(LIVE.evaluate(changed))["head"]
+    for other in (put(START, "page.row", "EAX"), put(changed, "look.drawing", "rotary")):
+        assert "is a rotary axis" not in part.render(LIVE.evaluate(other))["head"]
+
+
+def test_the_effect_of_a_rotary_error_is_that_over_the_range_of_its_axis():
+    """An error that turns with the table is as large at each of its positions."""
+    picture = LIVE.evaluate(START)
+    gains = _gains(picture, START)
+    assert gains["EXC"] == pytest.approx(1.0, rel=1e-6)
+    one = LIVE.evaluate(ROTARY.with_amplitude("EB0C", 1.0))
+    volume = LIVE.evaluate(START.zeroed().with_amplitude("EB0C", 1.0))
+    traced = np.sqrt((one.traced_um**2).sum(axis=1).mean())
+    assert gains["EB0C"] == pytest.approx(max(traced, volume.statistics.rms_um), rel=1e-9)
+    assert gains["EB0C"] >= traced > 0.1
+
+
+@pytest.mark.parametrize(("axis", "at"), [("C", 140.0), ("B", -25.0), ("C", 0.0), ("B", 30.0)])
+def test_play_begins_where_the_axis_was_scrubbed_to(axis, at):
+    angle = played_angle(START, axis, at)
+    assert played_position(START, angle, axis)[axis] == pytest.approx(at)
+
+
+def test_the_bar_plays_pauses_scrubs_and_ignores_what_is_no_position():
+    stage = Stage()
+    bar = Alone(PlaybackPanel, ROTARY, stage=stage)
+    bar.do("play", "B")
+    bar.do("play", "B")
+    bar.do("play", "")
+    bar.do("set.C", "140")
+    bar.do("set.B", "1e9")
+    for hostile in ("nan", "<b>", "", "9" * 400):
+        bar.do("set.C", hostile)
+    bar.do("set.X", "5")
+    bar.do("speed", "90")
+    bar.do("speed", "inf")
+    bar.do("stop")
+    high = FIRST.machine.axes["B"].travel[1]
+    top = FIRST.machine.axes["C"].travel[1]
+    assert stage.asked == [
+        ("play", True, "B"), ("play", False, "B"), ("play", True, "B"), ("scrub", "C", 140.0),
+        ("scrub", "B", high), ("scrub", "C", top), ("play", None, None),
+    ]  # fmt: skip
+    assert stage.speed_deg_s == 90.0
+    html = bar.part.render(LIVE.evaluate(ROTARY))["playback"]
+    assert 'aria-label="Position of C"' in html
+    volume = LIVE.evaluate(put(ROTARY, "look.drawing", "volume"))
+    assert bar.part.render(volume)["playback"] == ""
