@@ -11,7 +11,7 @@ from click.testing import CliRunner
 import warpspace
 from warpspace.cli.main import cli
 from warpspace.exceptions import OptionError, SceneError
-from warpspace.parts.interpreter import read_program
+from warpspace.parts.gcode.interpreter import read_program
 from warpspace.parts.program import Program, ToolPath, correct_program, trace_program
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
