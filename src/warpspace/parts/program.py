@@ -360,7 +360,8 @@ class ProgramResult(Result):
         if self.program.dialect:
             yield f"Dialect: {self.program.signs or self.program.dialect}"
         if self.program.skipped:
-            yield f"Ignored because of --skip: {', '.join(self.program.skipped)}"
+            words = [f"{words} (line {line})" for words, line in self.program.skipped.items()]
+            yield f"Ignored because of --skip: {', '.join(words[:MAX_LISTED])}"
         if self.program.integer_word:
             word, line = self.program.integer_word
             numbers = "Numbers without a decimal point are mm or degrees"
@@ -372,12 +373,9 @@ class ProgramResult(Result):
         if refused:
             listed, first = ", ".join(refused[:MAX_LISTED]), next(iter(program.reasons.values()))
             yield f"refused: {listed}; the path ends before the first of them{first}"
-        for listing, title in (
-            (program.skipped, "ignored because of --skip"), (program.remarks, "remarks")
-        ):  # fmt: skip
-            entries = [f"{word} (line {line})" for word, line in listing.items()]
-            if entries:
-                yield f"{title}: {', '.join(entries[:MAX_LISTED])}"
+        remarks = [f"{word} (line {line})" for word, line in program.remarks.items()]
+        if remarks:
+            yield f"remarks: {', '.join(remarks[:MAX_LISTED])}"
         if program.unused:
             yield f"unused: --offset {', '.join(program.unused)}"
         if program.signs and not program.dialect:

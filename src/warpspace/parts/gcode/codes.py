@@ -21,7 +21,7 @@ COMPENSATING = ("G43", "G43.4", "G234", "G49")
 WITH_H = {*COMPENSATING, "G15", "G56"}
 ONCE = {
     **{code: code for code in ("G4", "G10", "G28", "G30", "G52", "G53", "G68", "G92", "G92.1")},
-    "SUPA": "G53", "G153": "G53",
+    **{code: code for code in ("G68.2", "G53.1", "G51.1", "G50.1")},
 }  # fmt: skip
 CODES: Mapping[str, CodeHandler] = {
     **{code: modal("motion", code) for code in ("G0", "G1", "G2", "G3", *CYCLES)},
@@ -37,6 +37,8 @@ CODES: Mapping[str, CodeHandler] = {
     **dict.fromkeys(("G41", "G42"), Cycles.compensate_radius),
     **dict.fromkeys(("G52", "G92", "G92.1"), Cycles.shift_by),
     **dict.fromkeys(("G68", "G69"), Cycles.rotate),
+    **dict.fromkeys(("G51.1", "G50.1"), Cycles.mirror),
+    "G68.2": Cycles.tilt_plane, "G53.1": Cycles.align,
     "G10": Cycles.set_offset,
     **dict.fromkeys(("G4", "G28", "G30", "G53", "M97", "M98", "M99"), ignore),
 }  # fmt: skip

@@ -1,9 +1,7 @@
 """State of a control: modes, offsets, and the position in them."""
 
 from array import array
-from cmath import exp
 from collections.abc import Set
-from math import tau
 from typing import NoReturn
 
 import numpy as np
@@ -12,12 +10,14 @@ from warpspace.exceptions import SceneError
 from warpspace.kinematics.model import complete_coordinates
 from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.axes import is_linear
-from warpspace.machine.limits import FULL_TURN_DEG, MAX_PATH_POINTS
-from warpspace.parts.gcode.parsed import PLANES, STAND, axes_at, programmed_words, with_length
+from warpspace.machine.limits import MAX_PATH_POINTS
+from warpspace.parts.gcode.parsed import STAND, axes_at, programmed_words, with_length
 from warpspace.parts.gcode.settings import ControlSettings
 from warpspace.scene.model import Scene
+from warpspace.units import Array
 
 MM_PER_INCH = 25.4
+HEAD = 9  # columns of a move before the positions
 SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59")
 
 
@@ -45,18 +45,23 @@ class Control:
         self.motion, self.system, self.across, self.unit_mm = "G0", "G54", 2, 1.0
         self.absolute, self.to_initial, self.inverse_time = True, True, False
         self.is_compensated, self.has_blocks = False, False
-        self.shift = {"G52": dict[str, float](), "G92": dict[str, float]()}  # by letter, mm or °
-        self.rotation, self.pivot, self.rotated_about = 1.0 + 0j, 0j, 2  # of G68
-        self.needs_both = False  # axes of the plane, in the first block after G68 or G69
+        self.shift: dict[str, dict[str, float]] = {}  # by G52, G92, G254 and letter, mm or degrees
+        self.frame: Array | None = None  # [4, 4], of the words; see `frames`
+        self.swivelled: Array | None = None  # parts of it: by CYCLE800, and by TRANS, ROT …
+        self.programmed: Array | None = None
+        self.tilt: Array | None = None  # frame that waits for G53.1
+        self.is_tilted, self.arguments = False, ""  # the latter of a call
+        self.pending: set[str] = set()  # letters not named since their coordinates changed
+        self.frames = [np.eye(3)]  # rotations of arcs
         self.unnamed_axes: set[int] = {i for i, axis in enumerate(self.names) if is_linear(axis)}
-        self.lost = set[int]()  # axes whose position is unknown after G30
+        self.lost: set[int] = set()  # axes whose position is unknown after G30
         self.first = 0  # first row of the path
         self.once = ""  # non-modal code of the block, such as G4, G28 or G53
         self.letters: Set[str] = set[str]()  # axes that the block names
         self.cycle: dict[str, float] = {}  # words of a cycle, and the level before it, mm
         self.corner: tuple[str, float, int] | None = None  # of the last move: ",R", mm, its row
         self.integer_word: tuple[str, int] | None = None  # the first read as mm or degrees
-        self.rows, self.width = array("d"), 8 + len(self.names)
+        self.rows, self.width = array("d"), HEAD + len(self.names)
         stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
         self.position = [float(stand[axis]) for axis in self.names]
         self.tcp, self.length_mm = False, settings.length_mm
@@ -69,28 +74,6 @@ class Control:
     def refuse(self, word: str, reason: str) -> NoReturn:
         """End the path before the current block."""
         raise RefusedError(word, reason)
-
-    def compensate(self, code: str) -> None:
-        """Set the length compensation of the tool, and TCP."""
-        letter = "D" if code == "D" else "H"
-        number = f"{letter}{self.words.get(letter, 0.0):g}"
-        length, self.is_compensated = self.length_mm, code != "G49" and number != "D0"
-        if self.is_compensated:
-            length = self.offset.get(number, self.settings.length_mm)
-            self.used.add(number)
-            if not length:
-                self.remarks.setdefault(f"{number} without a length", self.line)
-        by_word = code in {"G43.4", "G234"} and self.settings.tcp == "program"
-        machine = self.scene.machine
-        turned = [
-            f"{axis}{at:g}"
-            for axis, at in zip(self.names, self.position, strict=True)
-            if by_word and at and not is_linear(axis) and axis in machine.chain.workpiece
-        ]
-        if turned:
-            at_zero = f"{code} at {' '.join(turned)}: workpiece frame at rotary zero"
-            self.remarks.setdefault(at_zero, self.line)
-        self.switch(tcp=by_word or self.settings.tcp == "always", length_mm=length)
 
     def compensate_radius(self, code: str) -> None:
         """Refuse a compensation of the cutter radius, unless its offset is given as zero."""
@@ -110,18 +93,20 @@ class Control:
         if code in {"G58", "G59"} and self.letters and not (is_move or self.dialect):
             expected = "--dialect fanuc (a work offset and a move) or sinumerik (a shift)"
             self.refuse(code, f"expected {expected}")
-        self.system = code
+        system, self.system = self.system, code
         if code in {"G54.1", "G154"}:
             self.system = f"G54.1P{self.words.get('P', 0.0):g}"
         elif code == "G15":
             self.system = f"G15H{self.words.get('H', 0.0):g}"
+        is_followed = self.frame is not None and self.tcp and not self.is_tilted
+        if self.system != system and (is_followed or "G254" in self.shift):
+            self.refuse(code, "expected G49 or G255 before, since the table is turned")
 
     def shift_by(self, code: str) -> None:
         """Shift the work offset (G52), or so that the position has given coordinates (G92)."""
         if code == "G92.1":
-            self.shift["G92"] = {}
-        if self.rotation != 1.0 or self.tcp:
-            self.refuse(code, "expected G69 and G49 before")
+            self.shift.pop("G92", None)
+        self.check_free(code)
         for letter in sorted(self.letters):
             value = self.value(letter)
             if code == "G92":
@@ -130,8 +115,8 @@ class Control:
                     at = "at a position that no block has commanded"
                     self.remarks.setdefault(f"G92 {letter} {at}", self.line)
                 at = self.position[self.index[letter]] - self.place(letter, value)
-                value = self.shift["G92"].get(letter, 0.0) + at
-            self.shift[code][letter] = value
+                value = self.shift.get("G92", {}).get(letter, 0.0) + at
+            self.shift.setdefault(code, {})[letter] = value
 
     def set_offset(self, code: str) -> None:
         """Set a work offset (L2; L20 according to the dialect) or a tool length (L10)."""
@@ -140,6 +125,8 @@ class Control:
         if kind == 10 and "R" in self.words:
             self.offset[f"H{number}"] = self.value("R")
             return
+        if self.frame is not None or "G254" in self.shift:
+            self.refuse(code, "expected frames cancelled before")
         if kind not in {2, 20} or not self.absolute or (kind == 20 and not self.dialect):
             expected = "L2, L10 R, or L20 with --dialect, in G90"
             self.refuse(f"{code} L{kind:g}", f"expected {expected}")
@@ -155,22 +142,10 @@ class Control:
                 self.system = active
             self.offset[system + letter] = value
 
-    def rotate(self, code: str) -> None:
-        """Rotate coordinates in the plane about a point, until G69."""
-        if code == "G69":
-            self.needs_both, self.rotation = self.needs_both or self.rotation != 1.0, 1.0 + 0j
-            return
-        names = PLANES[self.across]
-        if self.tcp or not self.absolute or self.rotation != 1.0 or not {*names} & {*self.index}:
-            self.refuse(code, "expected G49, G90, and one rotation at a time")
-        if "R" not in self.words or (self.letters and self.letters != {*names}):
-            self.refuse(code, f"expected R, and both {names[0]} and {names[1]} or neither")
-        self.uncorrectable.setdefault(self.line, code)
-        start = complex(*(self.position[self.index[x]] - self.place(x, 0.0) for x in names))
-        self.pivot = complex(*map(self.value, names)) if self.letters else start
-        self.rotation = exp(1j * tau * self.value("R") / FULL_TURN_DEG)
-        self.rotated_about = self.across
-        self.needs_both = True
+    def check_free(self, code: str) -> None:
+        """Refuse a change of coordinates beside a frame or the tool centre point."""
+        if self.frame is not None or self.tilt is not None or "G254" in self.shift or self.tcp:
+            self.refuse(code, "expected frames and tool centre point cancelled before")
 
     def switch(self, *, tcp: bool, length_mm: float) -> None:
         """Express the position in another mode; nothing moves."""
@@ -185,10 +160,10 @@ class Control:
             self.record(STAND)
         self.length_mm = length_mm
 
-    def record(self, kind: int, turn: float = 0.0, centre: complex = 0j) -> None:
+    def record(self, kind: int, turn: float = 0.0, centre: complex = 0j, frame: int = 0) -> None:
         if len(self.rows) > MAX_PATH_POINTS * self.width:
             self.fail(f"more than {MAX_PATH_POINTS:,} moves; expected fewer or larger pecks")
-        mode = self.line, kind, self.tcp, self.across, self.length_mm
+        mode = self.line, kind, self.tcp, self.across, frame, self.length_mm
         self.rows.extend((*mode, turn, centre.real, centre.imag, *self.position))
 
     def value(self, letter: str) -> float:
@@ -210,38 +185,6 @@ class Control:
         if key in self.offset:
             self.used.add(key)
             value += self.offset[key]
-        value += self.shift["G52"].get(letter, 0.0) + self.shift["G92"].get(letter, 0.0)
+        for shift in self.shift.values():
+            value += shift.get(letter, 0.0)
         return value + (self.length_mm if is_longer else 0.0)
-
-    def target(self) -> dict[int, float]:
-        """Return the target of the block by number of the axis."""
-        to: dict[int, float] = {}
-        names = PLANES[self.rotated_about]
-        is_rotated = self.rotation != 1.0 and bool(self.letters & {*names})
-        if self.needs_both and self.letters & {*names}:
-            if not (self.absolute and self.letters >= {*names}):
-                self.refuse(self.motion, f"expected {' and '.join(names)} in the first move")
-            self.needs_both = False
-        for letter in (x for x in self.words if x in self.index):
-            value, index = self.value(letter), self.index[letter]
-            mode = self.modes.get(letter, "")
-            is_absolute = mode == "AC" if mode else self.absolute
-            to[index] = self.place(letter, value) if is_absolute else self.position[index] + value
-        if is_rotated:
-            self.turn_target(to, names)
-        return to
-
-    def turn_target(self, to: dict[int, float], names: str) -> None:
-        """Rotate the target in the plane of G68."""
-        zero = complex(*(self.place(x, 0.0) for x in names)) + self.pivot
-        indices = [self.index[x] for x in names]
-        start = complex(*(self.position[index] for index in indices)) - zero
-        if self.absolute:
-            before = start / self.rotation + zero
-            first, second = indices
-            new = complex(to.get(first, before.real), to.get(second, before.imag))
-            turned = zero + self.rotation * (new - zero)
-        else:
-            step = complex(*(to.get(i, self.position[i]) - self.position[i] for i in indices))
-            turned = zero + start + self.rotation * step
-        to |= dict(zip(indices, (turned.real, turned.imag), strict=True))

@@ -4,15 +4,15 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from warpspace.machine.limits import MAX_CYCLE, MAX_CYCLE_MOVES, MIN_SPAN
-from warpspace.parts.gcode.motion import Motion
 from warpspace.parts.gcode.parsed import FEED, RAPID
+from warpspace.parts.gcode.tilted_planes import TiltedPlanes
 
 PECKING, TAPPING, STOPPING = {"G73", "G83"}, {"G74", "G84"}, {"G76", "G86", "G88", "G89"}
 FED_BACK = TAPPING | {"G85", "G89"}  # cycles that leave the hole at the feed
 CYCLES = "G81", "G82", "G85", *sorted(PECKING | TAPPING | STOPPING)
 
 
-class Cycles(Motion):
+class Cycles(TiltedPlanes):
     """Drilling cycles of a control."""
 
     def drill(self) -> None:
@@ -29,7 +29,9 @@ class Cycles(Motion):
             self.refuse(motion, f"expected {deep} and R")
         index, letter = self.index[deep], "K" if self.words.keys() - stored >= {"K"} else "L"
         repeats = self.count(letter)
-        initial = self.cycle.setdefault("initial", self.position[index])
+        self.pending -= self.letters - {deep}
+        self.check_pending()
+        initial = self.cycle.setdefault("initial", self.local()[index])
         clear = initial + self.cycle["R"]
         bottom = clear + self.cycle[deep]
         if self.absolute:
@@ -45,8 +47,8 @@ class Cycles(Motion):
             unknown = "retraction of its pecks" if motion == "G73" else "shift at its bottom"
             self.remarks.setdefault(f"{motion} without the {unknown}", self.line)
         for _ in range(repeats):
-            self.line_to({index: max(clear, self.position[index])}, RAPID)
-            self.line_to({**self.target(), index: self.position[index]}, RAPID)
+            self.line_to({index: max(clear, self.local()[index])}, RAPID)
+            self.line_to({**self.target(), index: self.local()[index]}, RAPID)
             for before, depth in pairwise([0.0, *depths]):
                 if motion == "G83" or not before:
                     self.line_to({index: clear}, RAPID)

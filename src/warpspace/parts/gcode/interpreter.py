@@ -28,8 +28,8 @@ import numpy as np
 from warpspace.exceptions import SceneError
 from warpspace.formats.source import MAX_LINE, MAX_LINES
 from warpspace.machine.limits import MAX_CALLS, MAX_LENGTH_MM, MAX_PROGRAM_BYTES, MAX_WORD
-from warpspace.parts.gcode.codes import CODES, MOTIONS, ONCE, WITH_H, CodeHandler, ignore
-from warpspace.parts.gcode.control import RefusedError
+from warpspace.parts.gcode.codes import CODES, MOTIONS, ONCE, WITH_H, CodeHandler
+from warpspace.parts.gcode.control import HEAD, RefusedError
 from warpspace.parts.gcode.cycles import CYCLES, Cycles
 from warpspace.parts.gcode.dialects.dialect import COMMON, MODAL_LETTERS, NO_AXES, WHOLE_BLOCK
 from warpspace.parts.gcode.dialects.registry import DIALECTS, KLARTEXT, detect_dialects
@@ -42,7 +42,7 @@ MAX_REMARKS = 1000  # words listed as not understood
 WORD = re.compile(
     rf"([A-Z])\s*+({NUMBER})(?![.\d#\[=]|E\d++(?![.\d]))"  # a letter, its number
     r"|\([^()]*+\)|;.*+"  # comments
-    rf"|(CR|[A-Z]|S\d)\s*+=\s*+(?:([AI]C)\s*+\()?\s*+({NUMBER}|\"[^\"]*+\")(?(4)\s*+\))"
+    rf"|(CR|RPL|RND|CHR|CHF|[A-Z]|S\d)\s*+=\s*+(?:([AI]C)\s*+\()?\s*+({NUMBER}|\"[^\"]*+\")(?(4)\s*+\))"
     r"(?![^\s;(])"  # an assignment of SINUMERIK
     r"|(\S[^\s(;]*+)",  # anything else
     re.IGNORECASE | re.ASCII,
@@ -58,10 +58,10 @@ _CONTROL_FLOW = re.compile(r".*[#\[<=]|GOTO|IF|WHILE|FOR|LOOP|REPEAT|CALL")
 _AXES, _POSITIONS = frozenset("XYZUVWABC"), frozenset("XYZUVWABCIJKRQ")
 _CYCLE_LETTERS = "RQPKL"
 _LETTERS = {  # beside axes, by the code that they belong to
-    "G0": ["E"], "G1": ["E", ",R", ",C"], **dict.fromkeys(("G2", "G3"), "IJKRPE"),
+    "G0": ["E"], "G1": ["E", ",R", ",C", "CHF"], **dict.fromkeys(("G2", "G3"), "IJKRPE"),
     **dict.fromkeys(CYCLES, _CYCLE_LETTERS),
     "G4": "PXUFS", "G10": "LPR", "G54.1": "P", "G154": "P", "G68": "R", "G92": "E",
-    "M98": "PL", "M97": "PL",
+    "M98": "PL", "M97": "PL", "G68.2": "IJK", "ROT": ["RPL"], "AROT": ["RPL"],
 }  # fmt: skip
 
 
@@ -95,12 +95,12 @@ def read_program(
         problems = [f"line {n}: {word}{control.reasons[n]}" for n, word in control.refused.items()]
         raise SceneError(name, problems[:1] or ["moves no axis; expected blocks in G-code"])
     rows = np.frombuffer(control.rows).reshape(-1, control.width)
-    line, kind, tcp, across = rows[:, :4].T.astype(np.int64)
+    line, kind, tcp, across, frame = rows[:, :5].T.astype(np.int64)
     kind[: control.first] = STAND
     return ParsedProgram(
-        scene, control.names, line, kind, tcp > 0, across, rows[:, 4], rows[:, 5],
-        rows[:, 6] + 1j * rows[:, 7], rows[:, 8:], control.refused, control.reasons,
-        control.remarks, control.skipped, control.uncorrectable,
+        scene, control.names, line, kind, tcp > 0, across, frame, rows[:, 5], rows[:, 6],
+        rows[:, 7] + 1j * rows[:, 8], rows[:, HEAD:], np.array(control.frames), control.refused,
+        control.reasons, control.remarks, control.skipped, control.uncorrectable,
         tuple(key for key, _ in control.settings.offset if key not in control.used),
         control.dialect, control.signs, control.integer_word, len(np.unique(line[kind != STAND])),
     )  # fmt: skip
@@ -128,9 +128,7 @@ class Interpreter(Cycles):
             self.signs = ", ".join(map(shorten, listed))
         dialect = DIALECTS.get(self.dialect)
         codes = {**CODES, **(dialect.codes if dialect else {})}
-        self.once_codes = {
-            code: name for code, name in ONCE.items() if codes.get(code) is CODES.get(code, ignore)
-        }
+        self.once_codes = {**ONCE, **(dialect.once if dialect else {})}
         self.handlers = {code: handler for code, handler in codes.items() if handler}
         self.motionless = {**COMMON, **(dialect.motionless if dialect else {})}
 
@@ -152,7 +150,7 @@ class Interpreter(Cycles):
                 self.fail(f"is no program in G-code; expected at most {size} other words")
             self.codes, self.words, self.tokens = [], {}, []
             self.integers, self.modes = set[str](), {}
-            self.skip, self.once, text = "", "", raw.replace("\0", "").strip()
+            self.skip, self.once, self.arguments, text = "", "", "", raw.replace("\0", "").strip()
             if text.startswith("%") and self.has_blocks and not self.calls:
                 return
             skipped = _SKIP.fullmatch(text)
@@ -187,6 +185,8 @@ class Interpreter(Cycles):
             letter, number = letter or name, number or value
             if not (letter or other):  # a comment
                 self.tokens.append(("", match[0]))
+                if match[0][0] == "(" and self.codes[-1:] == ["CYCLE800"]:
+                    self.arguments = match[0][1:-1]
                 continue
             is_code = letter in {"G", "M"} or bool(other)
             word = spell(letter, number) if letter and not name else shorten(match[0].upper())
@@ -236,7 +236,8 @@ class Interpreter(Cycles):
             is_text = number.startswith('"')
             if self.dialect != "sinumerik" or (is_text and letter != "T"):
                 self.refuse(shorten(word.upper()), "expected a letter and a number")
-            letter, number = "R" if letter == "CR" else letter[0], "0" if is_text else number
+            names = {"CR": "R", "RND": ",R", "CHR": ",C", "RPL": "RPL", "CHF": "CHF"}
+            letter, number = names.get(letter, letter[0]), "0" if is_text else number
             self.modes[letter] = mode
         limit = MAX_LENGTH_MM if letter[-1] in _POSITIONS else MAX_WORD
         value = float(number)
@@ -274,7 +275,7 @@ class Interpreter(Cycles):
         motions = [code for code in self.codes if code in MOTIONS]
         if len({*motions}) > 1:
             self.refuse(motions[-1], f"expected it in another block than {motions[0]}")
-        self.once = next((self.once_codes[x] for x in self.codes if x in self.once_codes), "")
+        self.once = next((x for x in map(self.once_codes.get, self.codes) if x), "")
         motion = motions[0] if motions else "G0" if "G80" in self.codes else self.motion
         if not self.words.keys() <= self.ordinary:
             self.check_letters(motion)

@@ -27,12 +27,14 @@ class ParsedProgram:
     kind: Integers  # [m]; STAND, RAPID, FEED or ARC
     tcp: NDArray[np.bool_]  # [m]
     across: Integers  # [m]; direction 0 to 2 about which an arc turns
+    frame: Integers  # [m]; of the arc, row of `frames`
     length_mm: Array  # [m], of the tool
     turn_rad: Array  # [m]; of an arc, positive counter-clockwise seen against that direction
     centre_mm: NDArray[np.complex128]  # [m]; of an arc, along the two axes of its `PLANES`
     # [m, a], mm and degrees; axis positions. With TCP those of the linear axes bring the scene's
     # tool point to where the tip is while rotary axes are at zero: see `upright`
     end: Array
+    frames: Array  # [k, 3, 3]; axes of frames in linear axes: an arc turns in those of its frame
     refused: Mapping[int, str]  # words by line; the path ends before the first
     reasons: Mapping[int, str]  # why they are refused, and what was expected
     remarks: Mapping[str, int]  # first line of each assumption, and of words without effect
@@ -50,13 +52,23 @@ class ParsedProgram:
         at = start + share[:, None] * (end - start)
         (arc,) = np.nonzero(self.turn_rad[move])
         move, share = move[arc], share[arc]
-        columns = [[self.axes.index(x) if x in self.axes else 0 for x in names] for names in PLANES]
+        is_turned, letters = len(self.frames) > 1, [name[0] for name in self.axes]
+        linear = [letters.index(x) for x in "XYZ"] if is_turned else []
+        rotations = self.frames[self.frame[move]]
+        if is_turned:
+            for places in (start, end, at):
+                places[arc[:, None], linear] = np.einsum(
+                    "nij,ni->nj", rotations, places[arc[:, None], linear]
+                )
+        columns = [[letters.index(x) if x in letters else 0 for x in names] for names in PLANES]
         rows, plane = arc[:, None], np.array(columns)[self.across[move]]
         centre = self.centre_mm[move]
         first, last = (places[rows, plane] @ [1.0, 1j] - centre for places in (start, end))
         grown = 1.0 + share * (np.abs(last / first) - 1.0)
         place = centre + first * grown * np.exp(1j * share * self.turn_rad[move])
         at[rows, plane] = np.stack([place.real, place.imag], axis=-1)
+        if is_turned:
+            at[rows, linear] = np.einsum("nij,nj->ni", rotations, at[rows, linear])
         return at
 
 

@@ -51,6 +51,11 @@ class ControlSettings:
     tcp: Literal["program", "always", "never"] = option(
         "program", "Tool centre point: switched by G43.4 and G49, or on or off throughout"
     )
+    tcp_frame: Literal["auto", "zero", "present"] = option(
+        "auto",
+        "Frame of the workpiece for G43.4 with a turned table: at rotary zero or at the"
+        " present positions; auto: present for fanuc, else zero",
+    )
     length_mm: float = option(
         0.0, "Length of the tool beyond the tool point of the scene", unit="mm",
         low=-MAX_TOOL_MM, high=MAX_TOOL_MM,

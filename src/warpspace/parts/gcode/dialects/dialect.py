@@ -24,6 +24,8 @@ class Dialect:
     codes: Mapping[str, CodeHandler | None] = field(  # None: another meaning, not executed
         default_factory=dict[str, CodeHandler | None]
     )
+    # codes whose block has another motion, or none, by the motion; "" if not with this dialect
+    once: Mapping[str, str] = field(default_factory=dict[str, str])
     comment: str = r"(?!)"  # expression for its comments
 
 

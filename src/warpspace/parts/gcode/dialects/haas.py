@@ -13,6 +13,12 @@ HAAS = Dialect(
         G187: PE!
         """
     ),
-    {"G234": Cycles.compensate, "G154": Cycles.select_system},
+    {
+        "G234": Cycles.compensate,
+        "G154": Cycles.select_system,
+        **dict.fromkeys(("G101", "G100"), Cycles.mirror),
+        **dict.fromkeys(("G254", "G255"), Cycles.follow_table),
+    },
+    once={"G101": "G101", "G100": "G100"},
     comment=r"\(HAAS",
 )

@@ -13,4 +13,5 @@ OKUMA = Dialect(
         "G15": Cycles.select_system,
         **dict.fromkeys(("G54", "G55", "G57", "G58", "G59", "G28", "G43", *CYCLES)),
     },
+    once={"G53": ""},
 )
