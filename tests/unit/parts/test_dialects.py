@@ -128,6 +128,12 @@ def test_a_printer_executes_the_file_of_a_slicer(text: str, length: float):
          "G90\nM99"), {}, 24 + math.sqrt(216) + 48),
         ("G0 X0 Y0 Z0\nM98 P30012\nM30\nO12\nG91 X1\nG90\nM99", {}, 3.0),
         ("G0 X0 Y0 Z0\nM97 P5 L2\nM30\nN5 G91 X1\nM99", {}, 2.0),
+        (("o100 sub\nG91 X1 (one)\nG90\no100 endsub\nG0 X0 Y0 Z0\no100 call\no2 repeat [3]\n"
+          "o100 call\no2 endrepeat (thrice)\no3 repeat [0]\nX99\no3 endrepeat\nM2"), {}, 4.0),
+        ("o<side> sub\nG1 X10\no<side> endsub\nG0 X0 Y0 Z0\no<side> call\nM2", {}, 10.0),
+        # corners of SINUMERIK: radius, leg and length of a chamfer
+        ("G0 X0 Y0 Z0 SUPA\nG1 X50 RND=5\nY50 CHR=2\nX0 CHF=2\nY0", {},
+         45 + 2.5 * math.pi + 43 + 8**0.5 + 48 - 2**0.5 + 2 + 50 - 2**0.5),
     ],
 )  # fmt: skip
 def test_common_constructs(text: str, offset: dict[str, float], length: float):

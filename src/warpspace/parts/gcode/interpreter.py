@@ -54,6 +54,11 @@ _HEADER = re.compile(  # lines before the first block
 )
 _CORNER = re.compile(rf"(,[RC])\s*+({NUMBER})")
 _LABEL = re.compile(r"\s*+(?:/\d?\s*+)?+(?:([O:N])\s*+0*+(\d++))", re.IGNORECASE)
+_FLOW = re.compile(  # of LinuxCNC, without variables
+    r"O\s*(\d++|<[^<>]++>)\s*(SUB|ENDSUB|CALL|REPEAT|ENDREPEAT)\s*(?:\[\s*(\d{1,6})\s*\])?\s*"
+    r"(?:[(;].*)?",
+    re.IGNORECASE,
+)
 _CONTROL_FLOW = re.compile(r".*[#\[<=]|GOTO|IF|WHILE|FOR|LOOP|REPEAT|CALL")
 _AXES, _POSITIONS = frozenset("XYZUVWABC"), frozenset("XYZUVWABCIJKRQ")
 _CYCLE_LETTERS = "RQPKL"
@@ -116,6 +121,7 @@ class Interpreter(Cycles):
         self.once_codes: Mapping[str, str] = {}  # codes whose block has another motion, or none
         self.calls, self.next_line = list[tuple[int, int, int]](), 0  # of subprograms
         self.labels: dict[tuple[str, float], int] = {}
+        self.flow: dict[tuple[str, str], int] = {}  # lines of O-words by word and name
         self.ordinary = (MODAL_LETTERS - {"H"}) | self.index.keys()  # checked no further
 
     def choose_dialect(self, lines: Sequence[str]) -> None:
@@ -141,6 +147,9 @@ class Interpreter(Cycles):
             if label and len(label[2]) < MAX_SHOWN:
                 kind = "N" if label[1] in "nN" else "O"
                 self.labels.setdefault((kind, int(label[2])), line)
+            flow = _FLOW.fullmatch(text.strip())
+            if flow:
+                self.flow.setdefault((flow[2].upper(), flow[1].upper()), line)
         executed = 0
         while self.next_line < len(program):
             raw, self.line, executed = program[self.next_line], self.next_line + 1, executed + 1
@@ -160,7 +169,10 @@ class Interpreter(Cycles):
             try:
                 if not self.has_blocks and KLARTEXT.match(text):
                     self.refuse("BEGIN PGM", "HEIDENHAIN Klartext; expected G-code (ISO)")
-                if self.has_blocks or not _HEADER.fullmatch(text):
+                flow = _FLOW.fullmatch(text) if self.dialect in {"", "linuxcnc"} else None
+                if flow:
+                    self.follow_flow(flow[1].upper(), flow[2].upper(), flow[3])
+                elif self.has_blocks or not _HEADER.fullmatch(text):
                     self.read_words(text)
                 if not self.refused:
                     self.execute_block()
@@ -307,23 +319,47 @@ class Interpreter(Cycles):
         for code in {"M97", "M98", "M99"} & {*self.codes}:
             self.call(code)
 
+    def follow_flow(self, name: str, word: str, count: str | None) -> None:
+        """Continue as an O-word of LinuxCNC demands."""
+        self.uncorrectable.setdefault(self.line, f"O{name}")
+        other = {"SUB": "ENDSUB", "CALL": "SUB", "REPEAT": "ENDREPEAT"}.get(word)
+        at = self.flow.get((other or word, name))
+        if at is None or (word == "REPEAT") != (count is not None) or not (other or self.calls):
+            partner = other or "CALL or REPEAT before"
+            self.refuse(f"O{name} {word}", f"expected O{name} {partner}, [number] with REPEAT")
+        if other is None:
+            self.leave()
+        elif word == "SUB" or count and not int(count):
+            self.next_line = at
+        else:
+            start, caller = (at, self.next_line) if word == "CALL" else (self.next_line, at)
+            self.enter(word, start, int(count or 1), caller)
+
+    def enter(self, word: str, start: int, repeats: int, caller: int) -> None:
+        """Continue at a subprogram."""
+        if len(self.calls) >= MAX_CALLS:
+            self.refuse(word, f"expected at most {MAX_CALLS} subprograms within each other")
+        if repeats:
+            self.calls.append((start, repeats - 1, caller))
+            self.next_line = start
+
+    def leave(self) -> None:
+        """Repeat a subprogram, continue after its call, or end the program."""
+        start, repeats, caller = self.calls.pop() if self.calls else (0, 0, MAX_LINES)
+        self.next_line = start if repeats else caller
+        if repeats:
+            self.calls.append((start, repeats - 1, caller))
+
     def call(self, code: str) -> None:
-        """Continue at a subprogram or after its call, or end the program."""
+        """Execute M97, M98 or M99."""
         self.uncorrectable.setdefault(self.line, code)
         if code == "M99":
-            start, repeats, caller = self.calls.pop() if self.calls else (0, 0, MAX_LINES)
-            self.next_line = start if repeats else caller
-            if repeats:
-                self.calls.append((start, repeats - 1, caller))
+            self.leave()
             return
         kind, number, repeats = "NO"[code == "M98"], self.words.get("P", 0.0), self.count("L")
         if (kind, number) not in self.labels and "L" not in self.words:
             repeats, number = max(int(number) // 10_000, 1), number % 10_000
         if (kind, number) not in self.labels:
             self.refuse(f"{code} P{number:g}", f"expected {kind}{number:g} in this file")
-        if len(self.calls) >= MAX_CALLS:
-            self.refuse(code, f"expected at most {MAX_CALLS} subprograms within each other")
         start = self.labels[kind, int(number)] - (kind == "N")
-        if repeats:
-            self.calls.append((start, repeats - 1, self.next_line))
-            self.next_line = start
+        self.enter(code, start, repeats, self.next_line)

@@ -24,7 +24,7 @@ class Motion(Frames):
         """Move to positions of some axes: bare ones, or places of the tip with TCP."""
         tcp = self.tcp
         self.switch(tcp=tcp and not bare, length_mm=self.length_mm)
-        before, to = self.position, to if bare else self.axis_targets(to)
+        before, to = self.position, to if bare or self.frame is None else self.axis_targets(to)
         self.position = [to.get(index, at) for index, at in enumerate(before)]
         kind = kind or (RAPID if self.motion == "G0" else FEED)
         if self.is_tilted or "G254" in self.shift:
@@ -32,7 +32,7 @@ class Motion(Frames):
                 if not is_linear(self.names[index]) and at != before[index]:
                     word = f"{self.names[index]}{at:g}"
                     self.refuse(word, "expected the tilted plane or G254 cancelled before")
-        if kind == FEED and not bare:
+        if self.pending and kind == FEED and not bare:
             self.check_pending()
         if self.lost - to.keys() and kind == FEED and self.first:
             axes = ", ".join(self.names[index] for index in self.lost - to.keys())
