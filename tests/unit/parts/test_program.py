@@ -198,7 +198,8 @@ def test_json_holds_together(dvf: Scene, tmp_path: Path):
 @pytest.mark.parametrize(
     ("text", "word"),
     [("#1=5", "#1=5"), ("G1 X[1+2]", "X[1+2]"), ("X#3", "X#3"), ("M98 P100", "M98 P100"),
-     ("G41 D1 X5", "G41"), ("O100 sub", "O100 SUB"), ("O100 call [5]", "O100 CALL"), ("O1 endsub", "O1 ENDSUB"), ("O1 if [1]", "O1"),
+     ("G41 D1 X5", "G41"), ("O100 sub", "O100 SUB"),
+     ("O100 call [5]", "O100 CALL"), ("O1 endsub", "O1 ENDSUB"), ("O1 if [1]", "O1"),
      ("IF [#1 GT 2] GOTO 5", "IF"),
      ("G05.1 X5", "G5.1"), ("M198 P5", "M198"),
      *((f"G{g} X5", f"G{g}") for g in (27, 29, 31, 34, 37, 47, 70, 110, 129, 150, 154))],

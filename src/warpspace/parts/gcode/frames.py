@@ -207,15 +207,16 @@ class Frames(Control):
         to: dict[int, float] = {}
         if self.tilt is not None and self.letters & {*"XYZ"}:
             self.refuse(self.motion, "expected G53.1 before")
-        local = self.local()
+        local = self.position if self.frame is None else self.local()
         for letter in (x for x in self.words if x in self.index):
             value, index = self.value(letter), self.index[letter]
             mode = self.modes.get(letter, "")
             is_absolute = mode == "AC" if mode else self.absolute
-            if letter in self.pending and not is_absolute:
+            if not is_absolute and letter in self.pending:
                 self.refuse(f"{letter}{self.words[letter]:g}", "expected G90 in another frame")
             to[index] = self.place(letter, value) if is_absolute else local[index] + value
-        self.pending -= self.letters
+        if self.pending:
+            self.pending -= self.letters
         return to
 
     def _linear(self) -> tuple[list[int], Array, float]:

@@ -147,7 +147,7 @@ class Interpreter(Cycles):
             if label and len(label[2]) < MAX_SHOWN:
                 kind = "N" if label[1] in "nN" else "O"
                 self.labels.setdefault((kind, int(label[2])), line)
-            flow = _FLOW.fullmatch(text.strip())
+            flow = _FLOW.fullmatch(text.strip()) if text.lstrip().startswith(("O", "o")) else None
             if flow:
                 self.flow.setdefault((flow[2].upper(), flow[1].upper()), line)
         executed = 0
@@ -329,7 +329,7 @@ class Interpreter(Cycles):
             self.refuse(f"O{name} {word}", f"expected O{name} {partner}, [number] with REPEAT")
         if other is None:
             self.leave()
-        elif word == "SUB" or count and not int(count):
+        elif word == "SUB" or (count and not int(count)):
             self.next_line = at
         else:
             start, caller = (at, self.next_line) if word == "CALL" else (self.next_line, at)

@@ -14,6 +14,7 @@ from warpspace.parts.gcode.parsed import ARC, FEED, PLANES, RAPID, STAND
 
 SLACK_MM, SLACK = 0.005, 1e-3  # by which radii at both ends of an arc may differ, or its share
 FULL_TURN_RAD = 1e-9  # an arc below it is a full circle
+CORNERS = frozenset((",R", ",C", "CHF"))
 CENTRES = "JK", "KI", "IJ"  # of arcs, by the direction across
 
 
@@ -23,7 +24,8 @@ class Motion(Frames):
     def line_to(self, to: Mapping[int, float], kind: int = STAND, *, bare: bool = False) -> None:
         """Move to positions of some axes: bare ones, or places of the tip with TCP."""
         tcp = self.tcp
-        self.switch(tcp=tcp and not bare, length_mm=self.length_mm)
+        if bare:
+            self.switch(tcp=False, length_mm=self.length_mm)
         before, to = self.position, to if bare or self.frame is None else self.axis_targets(to)
         self.position = [to.get(index, at) for index, at in enumerate(before)]
         kind = kind or (RAPID if self.motion == "G0" else FEED)
@@ -52,12 +54,13 @@ class Motion(Frames):
         if self.corner and self.motion == "G1":
             self.cut_corner(before, kind)
         self.record(kind)
-        for letter in {",R", ",C", "CHF"} & self.words.keys():
+        for letter in CORNERS & self.words.keys():
             is_tilted = self.frame is not None and abs(self.frame[self.across, self.across]) < 1.0
             if kind != FEED or self.tcp or is_tilted:
                 self.refuse(letter, "expected G1 without tool centre point or tilted plane")
             self.corner = letter, self.value(letter), len(self.rows) // self.width - 1
-        self.switch(tcp=tcp, length_mm=self.length_mm)
+        if bare:
+            self.switch(tcp=tcp, length_mm=self.length_mm)
 
     def cut_corner(self, at: Sequence[float], kind: int) -> None:
         """Round or chamfer the corner between the last move and the one to the position."""
