@@ -56,8 +56,9 @@ class Motion(Frames):
         self.record(kind)
         for letter in CORNERS & self.words.keys():
             is_tilted = self.frame is not None and abs(self.frame[self.across, self.across]) < 1.0
-            if kind != FEED or self.tcp or is_tilted:
-                self.refuse(letter, "expected G1 without tool centre point or tilted plane")
+            if kind != FEED or self.tcp or is_tilted or self.corner:
+                expected = "one corner of G1, without tool centre point or tilted plane"
+                self.refuse(letter, f"expected {expected}")
             self.corner = letter, self.value(letter), len(self.rows) // self.width - 1
         if bare:
             self.switch(tcp=tcp, length_mm=self.length_mm)

@@ -1,5 +1,6 @@
 """Tilted planes (3+2 axes): the rotary axes turn the tool along z of a frame."""
 
+import re
 from itertools import pairwise
 from math import atan2, sqrt, tau
 
@@ -15,6 +16,7 @@ from warpspace.machine.limits import FULL_TURN_DEG
 from warpspace.parts.gcode.frames import ALIGNED, rotation
 from warpspace.parts.gcode.motion import Motion
 from warpspace.parts.gcode.parsed import RAPID
+from warpspace.parts.gcode.settings import NUMBER
 from warpspace.units import Array
 
 
@@ -122,15 +124,15 @@ class TiltedPlanes(Motion):
         if arguments == [""]:  # whether the rotary axes return to zero depends on the control
             self.lost |= {i for i in rotary if self.position[i]}
             return
-        try:
-            retract, status, mode, sense = (int(arguments[i] or 0) for i in (0, 2, 3, 13))
-            numbers = [float(argument or 0.0) for argument in arguments[4:13]]
-        except (ValueError, IndexError):
+        values = [argument or "0" for argument in (*arguments[:1], *arguments[2:])]
+        if len(values) < 13 or not all(re.fullmatch(NUMBER, value) for value in values):
             self.refuse(code, "expected 14 arguments or more, all numbers but the second")
+        retract, status, mode, *numbers = map(float, values[:13])
+        sense = numbers.pop()
         order = [mode % 4 - 1, mode // 4 % 4 - 1, mode // 16 - 1]
         if (
             {*order} != {0, 1, 2}
-            or status % 1000 > 1
+            or status % 1000 not in {0, 1}
             or retract not in {0, 1, 2}
             or abs(sense) != 1
         ):
@@ -140,11 +142,11 @@ class TiltedPlanes(Motion):
             )
         self.remark_turned(code)
         frame = transforms.translation(np.array(numbers[:3]) * self.unit_mm)
-        for index in order:
+        for index in map(int, order):
             frame = frame @ rotation(index, numbers[3 + index])
         frame = frame @ transforms.translation(np.array(numbers[6:]) * self.unit_mm)
         frame = frame if additive is None or not status % 2 else additive @ frame
         if retract and self.first:
-            self.lost |= {self.index[x] for x in ("Z", "XYZ")[retract - 1] if x in self.index}
+            self.lost |= {self.index[x] for x in ("Z", "XYZ")[int(retract) - 1] if x in self.index}
         self.swivel(code, frame, sense)
         self.swivelled = frame
