@@ -16,6 +16,7 @@ from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 from hashlib import sha256
 from io import StringIO
+from math import tau
 from typing import Any
 
 import numpy as np
@@ -307,8 +308,11 @@ class Program(ControlSettings, Analysis):
             near = ", ".join(map(str, lines[np.argsort(np.abs(lines - self.at_line))][:3]))
             raise OptionError(f"{{at_line}} {self.at_line} moves no axis; expected {near}")
         deviation, along, across = path.deviations()
+        count = np.maximum(np.bincount(path.move, minlength=len(program.line)), 1)
+        angle = (np.abs(program.turn_rad) / count)[path.move]
+        length = np.linalg.norm(path.step_mm, axis=1) / np.sinc(angle / tau)  # of arcs, not chords
         return ProgramResult(
-            length_mm=float(np.linalg.norm(path.step_mm, axis=1).sum()),
+            length_mm=float(length.sum()),
             outside=int(path.outside.sum()),
             deviation=deviation,
             along=along,

@@ -142,6 +142,79 @@ def test_common_constructs(text: str, offset: dict[str, float], length: float):
     assert result.length_mm == pytest.approx(length, abs=2e-3)
 
 
+G18 = """G90 G17 G20
+G0 X0.5228 Y-0.1828
+Z0.2
+Z0.05
+G1 Z-0.0375 F8
+G18 G3 X0.4853 Z-0.075 I-0.0375
+G1 X0.3125
+X0.1625
+G17 G2 Y0.0852 J0.134
+G1 X0.3125
+G2 Y-0.1828 J-0.134
+G1 X-0.1625
+X-0.3125
+G2 Y0.0852 J0.134
+G1 X-0.1625
+G18 G2 X-0.125 Z-0.0375 K0.0375
+G0 Z0.2"""
+DRAG_KNIFE = """G0 X0 Y0 Z.8
+G0 X6.0004 Y9.2749
+G1 Z-0.05
+G3 X7.4141 Y9.2740 R1
+G1 X10.0048 Y6.6781
+G2 X8.5911 Y6.6790 R1
+G1 X9.7718 Y9.7373
+G3 X8.3572 Y8.3234 R1
+G0 Z.8"""
+G81 = """g98 g90 g20 f10
+{}
+g81 {}1 {}1 {}-1 r1
+g81 {}1 {}2 {}0.5 r3
+g81 {}1 {}3 {}4 r5
+m2"""
+
+
+def half_circles(*blocks: str) -> str:
+    return "G0 X34.8831 Y-4.3512 Z0\n" + "\n".join(blocks)
+
+
+@pytest.mark.parametrize(
+    ("text", "length"),
+    [
+        # arcs in G18; values of the threads, and closed forms
+        (G18, 78.8284),
+        (DRAG_KNIFE, 25.974),
+        ("G17 G0 X10 Y10 Z0\nG02 X20 Y0 R-10", 15 * math.pi),
+        (half_circles("G1 Z-0.1", "G03 X36.8831 Y-4.3512 R1", "G03 X34.8831 Y-4.3512 R1"),
+         0.1 + 2 * math.pi),
+        ("G0 X0 Y0 Z0\nG3 X41.089 Y-28.164 I20.5445 J-14.082\nX0 Y0 I-20.5445 J14.082",
+         math.tau * math.hypot(20.5445, 14.082)),
+        ("G0 X30 Y0 Z0\nG2 I-30.", 60 * math.pi),
+        # cycles of LinuxCNC in two planes
+        (G81.format("g17 g0 x0 y0 z2", *"xyz" * 3), 493.1210),
+        (G81.format("g19 g0 x2 y0 z0", *"yzx" * 3), 493.1210),
+        # the circle of circle, diamond and square
+        (("g90 g20\nG0 X2 Y0.375 Z2.1\nG1 Z1.6875\nG2 X0.375 Y2 R1.625\nG2 X2 Y3.625 R1.625\n"
+          "G2 X3.625 Y2 R1.625\nG2 X2 Y0.375 R1.625\nG1 Z2.1"), 25.4 * (3.25 * math.pi + 0.825)),
+    ],
+)  # fmt: skip
+def test_lengths_of_arcs_and_cycles(text: str, length: float):
+    result = run(text)
+    assert result.program.refused == {}
+    assert result.length_mm == pytest.approx(length, abs=2e-3)
+
+
+def test_shifts_of_the_programs_of_controls():
+    """Words of an unshifted program, and those after a shift, lead to the same path."""
+    shifted = "G17 G90 G54\nG0 X0 Y0 Z10\nTRANS X100 Y50\nG1 X0 Y0 Z0 F300\nX10\nTRANS\nG0 Z10"
+    reference = "G17 G90 G54\nG0 X0 Y0 Z10\nG1 X100 Y50 Z0 F300\nG1 X110\nG0 Z10"
+    assert run(shifted).length_mm == pytest.approx(run(reference).length_mm)
+    unnamed = run(shifted.replace("G1 X0 Y0 Z0", "G1 Z0"))
+    assert unnamed.program.refused == {4: "G1"}
+
+
 def test_the_path_of_a_haas_deep_hole_without_q():
     hole = "G83 Z-40. R2. I10. J2. K3. F100."
     result = run(f"(HAAS)\nG0 X0 Y0 Z10.\n{hole}")
