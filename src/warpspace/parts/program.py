@@ -49,8 +49,10 @@ from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import FULL_TURN_DEG, MAX_LINE_POINTS, MAX_PATH_POINTS
 from warpspace.parts.gcode.codes import COMPENSATING
+from warpspace.parts.gcode.control_settings import ControlSettings
 from warpspace.parts.gcode.cycles import CYCLES
 from warpspace.parts.gcode.interpreter import Interpreter, program_lines, read_program
+from warpspace.parts.gcode.motion import CORNERS
 from warpspace.parts.gcode.parsed import (
     RAPID,
     STAND,
@@ -59,7 +61,6 @@ from warpspace.parts.gcode.parsed import (
     programmed_words,
     with_length,
 )
-from warpspace.parts.gcode.settings import ControlSettings
 from warpspace.scene.model import Scene, check_magnitude, second_order
 from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.scene.text_files import one_line
@@ -523,14 +524,11 @@ def _blocks(
     """Write the current line of a control as straight blocks to places, [n, a]."""
     number = [word for key, word in state.tokens if key == "N"]
     replaced = _MODES | _LAST | {"N", "G0", "G1", *state.index}
+    replaced |= {"CR", "RND", "CHR", *CORNERS, *("IJKLPQR" if state.cycle else "")}
     replaced |= {
-        "CR",
-        ",R",
-        ",C",
-        *("IJKLPQR" if state.cycle else ""),
         *("F" if state.inverse_time else ""),
+        *("IJKPR" if state.motion in {"G2", "G3"} else ""),
     }
-    replaced |= {*("IJKPR" if state.motion in {"G2", "G3"} else "")}
     other_words = [word for key, word in state.tokens if key not in replaced]
     last = [code for code in state.codes if code in _LAST]
     for index, (kind, place) in enumerate(zip(kinds, places, strict=True), start=1):

@@ -14,9 +14,9 @@ from products import first
 from warpspace.analysis.registry import verb
 from warpspace.bench.kinds.circular import Circular
 from warpspace.exceptions import OptionError, SceneError
+from warpspace.parts.gcode.control_settings import ControlSettings
 from warpspace.parts.gcode.interpreter import read_program
 from warpspace.parts.gcode.parsed import STAND, ParsedProgram, with_length
-from warpspace.parts.gcode.settings import ControlSettings
 from warpspace.parts.program import Program, ToolPath, trace_program
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene, evaluate

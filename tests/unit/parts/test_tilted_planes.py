@@ -6,8 +6,8 @@ import pytest
 import warpspace
 from warpspace.kinematics.chain import branch_pose, tool_axis
 from warpspace.kinematics.transforms import axis_rotation, inverse, rotate
+from warpspace.parts.gcode.control_settings import ControlSettings
 from warpspace.parts.gcode.interpreter import read_program
-from warpspace.parts.gcode.settings import ControlSettings
 from warpspace.parts.program import ToolPath, trace_program
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene

@@ -11,8 +11,8 @@ from warpspace.kinematics.model import complete_coordinates
 from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import MAX_PATH_POINTS
+from warpspace.parts.gcode.control_settings import ControlSettings
 from warpspace.parts.gcode.parsed import STAND, axes_at, programmed_words, with_length
-from warpspace.parts.gcode.settings import ControlSettings
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 

@@ -94,8 +94,8 @@ class Frames(Control):
         if not letters <= {*"XYZ", *(("RPL",) if kind == "ROT" else ())} or (
             kind == "ROT" and len(letters) > 1
         ):
-            one = "one angle: X, Y, Z or RPL=" if kind == "ROT" else "X, Y, Z"
-            self.refuse(code, f"expected {one} in its block")
+            expected = "one angle: X, Y, Z or RPL=" if kind == "ROT" else "X, Y, Z"
+            self.refuse(code, f"expected {expected} in its block")
         new = np.eye(4)
         for x in letters:
             row = self.across if x == "RPL" else "XYZ".index(x)
@@ -181,6 +181,7 @@ class Frames(Control):
             if self.frame is not None:
                 self.refuse(code, "expected frames cancelled before")
             self.frame = self.table_frame()
+            self.uncorrectable.setdefault(self.line, code)
 
     def table_frame(self) -> Array:
         """Compute the frame in which words of the present table are places at rotary zero."""
@@ -192,8 +193,8 @@ class Frames(Control):
             at[name] = np.full(4, position if is_linear(name) or name in chain.workpiece else 0.0)
         names = [self.names[self.index[x]] for x in "XYZ"]
         at |= dict(zip(names, places.T, strict=True))
-        words = programmed_words(model, relative_point(model, at), at)
-        points = np.stack([words[name] for name in names], axis=-1)
+        axes = programmed_words(model, relative_point(model, at), at)
+        points = np.stack([axes[name] for name in names], axis=-1)
         return transforms.rigid((points[1:] - points[0]).T, points[0] - zero)
 
     def check_pending(self) -> None:
@@ -230,12 +231,12 @@ class Frames(Control):
         if self.frame is None:
             return self.position
         indices, zero, length = self._linear()
-        words = transforms.apply(
+        coordinates = transforms.apply(
             transforms.inverse(self.frame), np.array(self.position)[indices] - zero
         )
-        words[2] += length
+        coordinates[2] += length
         local = np.array(self.position)
-        local[indices] = words + zero
+        local[indices] = coordinates + zero
         return local.tolist()
 
     def axis_targets(self, to: Mapping[int, float]) -> Mapping[int, float]:
@@ -243,9 +244,11 @@ class Frames(Control):
         if self.frame is None:
             return to
         local, (indices, zero, length) = self.local(), self._linear()
-        words = np.array([to.get(index, local[index]) for index in indices]) - zero
-        words[2] -= length
-        places = zip(indices, (transforms.apply(self.frame, words) + zero).tolist(), strict=True)
+        coordinates = np.array([to.get(index, local[index]) for index in indices]) - zero
+        coordinates[2] -= length
+        places = zip(
+            indices, (transforms.apply(self.frame, coordinates) + zero).tolist(), strict=True
+        )
         moved = {i: at for i, at in places if i in to or abs(at - self.position[i]) > ALIGNED}
         return {**{i: at for i, at in to.items() if i not in indices}, **moved}
 

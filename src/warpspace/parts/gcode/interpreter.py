@@ -30,11 +30,17 @@ from warpspace.formats.source import MAX_LINE, MAX_LINES
 from warpspace.machine.limits import MAX_CALLS, MAX_LENGTH_MM, MAX_PROGRAM_BYTES, MAX_WORD
 from warpspace.parts.gcode.codes import CODES, MOTIONS, ONCE, WITH_H, CodeHandler
 from warpspace.parts.gcode.control import HEAD, RefusedError
+from warpspace.parts.gcode.control_settings import (
+    MAX_SHOWN,
+    NUMBER,
+    ControlSettings,
+    shorten,
+    spell,
+)
 from warpspace.parts.gcode.cycles import CYCLES, Cycles
+from warpspace.parts.gcode.dialects.detection import DIALECTS, KLARTEXT, detect_dialects
 from warpspace.parts.gcode.dialects.dialect import COMMON, MODAL_LETTERS, NO_AXES, WHOLE_BLOCK
-from warpspace.parts.gcode.dialects.registry import DIALECTS, KLARTEXT, detect_dialects
 from warpspace.parts.gcode.parsed import STAND, ParsedProgram
-from warpspace.parts.gcode.settings import MAX_SHOWN, NUMBER, ControlSettings, shorten, spell
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import check_file
 

@@ -13,10 +13,10 @@ from warpspace.kinematics.model import Model
 from warpspace.kinematics.relative_motion import programmed_direction
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import FULL_TURN_DEG
+from warpspace.parts.gcode.control_settings import NUMBER
 from warpspace.parts.gcode.frames import ALIGNED, rotation
 from warpspace.parts.gcode.motion import Motion
 from warpspace.parts.gcode.parsed import RAPID
-from warpspace.parts.gcode.settings import NUMBER
 from warpspace.units import Array
 
 
@@ -102,8 +102,10 @@ class TiltedPlanes(Motion):
                     nearest = np.abs(positions - self.position[index]).argmin()
                     targets[index] = float(positions[nearest])
             if len(targets) == len(solution):
-                way = sum(abs(at - self.position[index]) for index, at in targets.items())
-                solutions.append((-sense * solution.get(leading, 0.0) if sense else way, targets))
+                distance = sum(abs(at - self.position[index]) for index, at in targets.items())
+                solutions.append(
+                    (-sense * solution.get(leading, 0.0) if sense else distance, targets)
+                )
         if not solutions:
             self.refuse(code, "expected a plane that two rotary axes reach within their travel")
         _, targets = min(solutions, key=lambda solution: solution[0])
@@ -124,10 +126,10 @@ class TiltedPlanes(Motion):
         if arguments == [""]:  # whether the rotary axes return to zero depends on the control
             self.lost |= {i for i in rotary if self.position[i]}
             return
-        values = [argument or "0" for argument in (*arguments[:1], *arguments[2:])]
-        if len(values) < 13 or not all(re.fullmatch(NUMBER, value) for value in values):
+        fields = [argument or "0" for argument in (*arguments[:1], *arguments[2:])]
+        if len(fields) < 13 or not all(re.fullmatch(NUMBER, field) for field in fields):
             self.refuse(code, "expected 14 arguments or more, all numbers but the second")
-        retract, status, mode, *numbers = map(float, values[:13])
+        retract, status, mode, *numbers = map(float, fields[:13])
         sense = numbers.pop()
         order = [mode % 4 - 1, mode // 4 % 4 - 1, mode // 16 - 1]
         if (

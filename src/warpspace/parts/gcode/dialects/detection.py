@@ -3,12 +3,12 @@
 import re
 from collections.abc import Sequence
 
-from warpspace.parts.gcode.dialects.fanuc import FANUC
-from warpspace.parts.gcode.dialects.haas import HAAS
-from warpspace.parts.gcode.dialects.linuxcnc import LINUXCNC
-from warpspace.parts.gcode.dialects.okuma import OKUMA
-from warpspace.parts.gcode.dialects.printer import PRINTER
-from warpspace.parts.gcode.dialects.sinumerik import SINUMERIK
+from warpspace.parts.gcode.dialects.fanuc_dialect import FANUC
+from warpspace.parts.gcode.dialects.haas_dialect import HAAS
+from warpspace.parts.gcode.dialects.linuxcnc_dialect import LINUXCNC
+from warpspace.parts.gcode.dialects.okuma_dialect import OKUMA
+from warpspace.parts.gcode.dialects.printer_dialect import PRINTER
+from warpspace.parts.gcode.dialects.sinumerik_dialect import SINUMERIK
 
 DIALECTS = {dialect.name: dialect for dialect in (FANUC, HAAS, SINUMERIK, OKUMA, LINUXCNC, PRINTER)}
 _SIGN, _COMMENT_SIGN = (
