@@ -253,7 +253,7 @@ class PathPoint:
 class Program(ControlSettings, Analysis):
     """Evaluate the errors along the path of a program on SCENE.
 
-    G-code: motion in three planes, offsets, lengths, tool centre point, rotation in the plane,
+    G-code: motion in three planes, offsets, lengths, tool centre point, frames, tilted planes,
     drilling cycles, subprograms. The path ends before a word that is neither executed nor known to
     move no axis; it is reported with its line. Errors are those of the tool against the workpiece,
     in the workpiece frame, actual − nominal. Geometry only: no forces, heat, wear or servo.

@@ -174,6 +174,8 @@ def test_traori_is_the_tool_centre_point():
     [
         ("G1 X10\nG51.1 X0\nG1 X20\nG50.1 X0\nG1 X30", 90.0),
         ("G51.1 X5\nG1 X0 Y0\nG2 X10 Y0 R5", 10.0 + 5 * np.pi),
+        ("G51.1 X0\nG1 X5\nG69\nX9", 9.0),
+        ("G68 X0 Y0 R180\nG50.1\nG1 X5 Y0\nX-5", 15.0),
         ("G52 X10\nG0 X0\nG51.1 X0 Y0\nG1 X3 Y4", 10 + 5.0),
     ],
 )

@@ -47,6 +47,7 @@ class Control:
         self.is_compensated, self.has_blocks = False, False
         self.shift: dict[str, dict[str, float]] = {}  # by G52, G92, G254 and letter, mm or degrees
         self.frame: Array | None = None  # [4, 4], of the words; see `frames`
+        self.frame_code = ""  # that set it
         self.swivelled: Array | None = None  # parts of it: by CYCLE800, and by TRANS, ROT …
         self.programmed: Array | None = None
         self.tilt: Array | None = None  # frame that waits for G53.1

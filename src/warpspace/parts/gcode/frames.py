@@ -38,6 +38,7 @@ class Frames(Control):
         self.uncorrectable.setdefault(self.line, code)
         before, tcp = self.local(), self.tcp and not self.is_tilted
         self.frame, self.is_tilted, self.tilt = frame, is_tilted, None
+        self.frame_code = code if frame is not None else ""
         self.switch(tcp=tcp or is_tilted, length_mm=self.length_mm)
         changed = [abs(x - y) > ALIGNED for x, y in zip(before, self.local(), strict=True)]
         is_mixing = frame is not None and np.count_nonzero(frame[:3, :3]) > 3
@@ -48,7 +49,7 @@ class Frames(Control):
     def rotate(self, code: str) -> None:
         """Rotate coordinates in the plane about a point (G68), until G69."""
         if code == "G69":
-            if self.frame is not None or self.tilt is not None:
+            if self.frame_code in {"G68", "G53.1"} or self.tilt is not None:
                 self.set_frame(code)
             return
         self.check_free(code)
@@ -69,11 +70,12 @@ class Frames(Control):
     def mirror(self, code: str) -> None:
         """Mirror coordinates at positions of axes: G51.1, or G101 of Haas; until G50.1 or G100."""
         if code in {"G50.1", "G100"}:
-            mirrored = {x for x in "XYZ" if self.frame is not None and self.frame[:3, :3].trace()
-                        < 3.0 and self.frame["XYZ".index(x), "XYZ".index(x)] == -1.0}  # fmt: skip
-            if self.letters and self.letters != mirrored and mirrored:
-                self.refuse(code, f"expected {' and '.join(sorted(mirrored))}")
-            if mirrored:
+            if self.frame is not None and self.frame_code in {"G51.1", "G101"}:
+                mirrored = [
+                    x for x, at in zip("XYZ", np.diag(self.frame), strict=False) if at < 0.0
+                ]
+                if self.letters and self.letters != {*mirrored}:
+                    self.refuse(code, f"expected {' and '.join(mirrored)}")
                 self.set_frame(code)
             return
         self.check_free(code)
@@ -108,8 +110,9 @@ class Frames(Control):
         self.programmed = (
             (new if old is None else old @ new) if letters or old is not None else None
         )
-        frames = [frame for frame in (self.swivelled, self.programmed) if frame is not None]
-        frame = np.linalg.multi_dot([np.eye(4), *frames]) if frames else None
+        frame = self.programmed
+        if self.swivelled is not None:
+            frame = self.swivelled if frame is None else self.swivelled @ frame
         self.set_frame(code, frame, is_tilted=self.is_tilted)
 
     def transform(self, code: str) -> None:
@@ -167,8 +170,8 @@ class Frames(Control):
         by_word = code in {"G43.4", "G234"} and self.settings.tcp == "program"
         if by_word and self.is_tilted:
             self.refuse(code, "expected G69 before")
-        if code != "D" and self.tcp and not self.is_tilted:
-            self.frame = None  # of the table
+        if self.frame_code in {"G43.4", "G234"}:
+            self.frame, self.frame_code = None, ""
         tcp = by_word or self.is_tilted or self.settings.tcp == "always"
         self.switch(tcp=tcp or (code == "D" and self.tcp), length_mm=length)
         if not by_word:
@@ -180,7 +183,7 @@ class Frames(Control):
         if self.remark_turned(code, f"{name} (--tcp-frame)") and present:
             if self.frame is not None:
                 self.refuse(code, "expected frames cancelled before")
-            self.frame = self.table_frame()
+            self.frame, self.frame_code = self.table_frame(), code
             self.uncorrectable.setdefault(self.line, code)
 
     def table_frame(self) -> Array:
