@@ -104,7 +104,7 @@ class Part(WorkpieceAnalysis):
             features=features_of,
             uncertainty=uncertainty and uncertainty.errors,
             interpolation_um=interpolation,
-            workpiece=place_workpiece(mesh, scene, self.place),
+            workpiece=surface if fine is mesh else place_workpiece(mesh, scene, self.place),
             actual=actual,
             scene=scene,
             analysis=self,
