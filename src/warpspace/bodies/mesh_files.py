@@ -179,6 +179,8 @@ def frame_meshes(
                     " triangles, the most expected"
                 )
             parts.setdefault(frame, []).append(mesh)
+    for mesh in meshes.values():
+        notes += [] if isinstance(mesh, str) else mesh.metadata["notes"]
     return {frame: util.concatenate(own) for frame, own in parts.items()}, notes, list(meshes)
 
 
@@ -235,7 +237,9 @@ def _mesh(geometry: Any, folders: tuple[Path, Path], meshes: dict[Path, Any]) ->
         )
     if path not in meshes:
         try:
-            loaded = open_meshes(path, "mesh").to_mesh()
+            scene = open_meshes(path, "mesh")
+            loaded = scene.to_mesh()
+            loaded.metadata["notes"] = scene.metadata["notes"]
             meshes[path] = loaded if len(loaded.faces) else "it is empty"
         except OptionError as error:
             meshes[path] = str(error)

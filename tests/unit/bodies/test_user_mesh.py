@@ -17,8 +17,9 @@ import pytest
 import trimesh
 
 from warpspace.bodies.mesh import open_meshes
-from warpspace.bodies.mesh_files import FORMATS, frame_meshes, load_mesh, read_mesh
+from warpspace.bodies.mesh_files import FORMATS, check_meshes, frame_meshes, load_mesh, read_mesh
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
+from warpspace.scene.library import load_scene
 from warpspace.scene.urdf import place_robot, read_robot
 
 SIZE = np.array([300.0, 200.0, 100.0])
@@ -516,3 +517,23 @@ def test_an_ambiguous_stl_is_refused(content, message, tmp_path):
     path.write_bytes(content.encode() if isinstance(content, str) else content)
     with pytest.raises(OptionError, match=message):
         load_mesh(path, "R")
+
+
+def test_a_repaired_stl_of_a_robot_is_reported(tmp_path):
+    (tmp_path / "link.stl").write_bytes(BINARY_STL + b"spare")
+    shape = '<visual><geometry><mesh filename="link.stl"/></geometry></visual>'
+    robot, _ = read_robot(urdf(tmp_path / "a.urdf", 2, shape * 2))
+    meshes, notes, _ = frame_meshes(robot, place_robot(robot, "a.urdf").frame_of, tmp_path)
+    assert notes == [f"{tmp_path / 'link.stl'}: 5 bytes after its last triangle are ignored"]
+    assert sum(len(mesh.faces) for mesh in meshes.values()) == 12 * 2
+
+
+def test_a_repaired_stl_of_a_machine_is_reported(tmp_path):
+    (tmp_path / "bed.stl").write_bytes(BINARY_STL + b"spare")
+    text = (
+        '[machine]\nchain = "wFXYZt"\n[bodies]\nR = "bed.stl"\n'
+        "[workspace]\nX = [0, 1]\nY = 0\nZ = 0\n"
+    )
+    (tmp_path / "m.toml").write_text(text)
+    (remark,) = check_meshes(load_scene(tmp_path / "m.toml").machine)
+    assert remark.endswith("bed.stl: 5 bytes after its last triangle are ignored")
