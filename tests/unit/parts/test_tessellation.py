@@ -24,7 +24,7 @@ def part_of(mesh):
     return Workpiece("x", np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32))
 
 
-def drilled(facets, size=(200.0, 150.0, 40.0), radius=10.0, at=(40.0, 30.0)):
+def drilled(facets, size=(200.0, 150.0, 40.0), radius=10.0, at=(70.0, 45.0)):
     """A plate with a hole, whose top and bottom are long triangles."""
     hole = make.cylinder(radius, 2.0 * size[2], sections=facets).apply_translation([*at, 0.0])
     return trimesh.boolean.difference([make.box(size), hole])
@@ -167,7 +167,7 @@ def test_clamp_states_one_value_for_a_position(facets, tmp_path):
     made = warpspace.clamp(scene, file=str(file), placed=True, grid=3)
     assert made.best == min([made.present, *made.places], key=lambda at: at.placed_um)
     assert made.present.placed_um == pytest.approx(4.27, rel=0.01)
-    assert made.best.placed_um == pytest.approx(4.00, rel=0.01)
+    assert made.best.placed_um == pytest.approx(4.00, rel=0.01)  # stated 5.80 and 4.39
     for at in made.places:
         if at.place == made.present.place:
             assert at == made.present
