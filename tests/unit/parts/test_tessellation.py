@@ -58,8 +58,10 @@ WEDGE = make.extrude_polygon(
 BALLS = make.icosphere(4, 70.0), make.uv_sphere(70.0, count=[120, 200])
 SHAPES = {
     "hole": tessellate(drilled, 64, 512),
-    "large hole": tessellate(lambda n: drilled(n, radius=45.0), 48, 360),
-    "thin plate": tessellate(lambda n: drilled(n, (240.0, 160.0, 6.0), 30.0), 64, 300),
+    "large hole": tessellate(lambda n: drilled(n, radius=45.0, at=(40.0, 20.0)), 48, 360),
+    "thin plate": tessellate(
+        lambda n: drilled(n, (240.0, 160.0, 6.0), 30.0, (40.0, 30.0)), 64, 300
+    ),
     "eccentric hole": tessellate(lambda n: drilled(n, radius=15.0, at=(-75.0, -50.0)), 40, 400),
     "box": (BOX, divided(BOX, 10.0)),
     "dense corner": (BOX, dense_at_a_corner((200.0, 150.0, 40.0))),
