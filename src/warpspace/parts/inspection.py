@@ -143,7 +143,9 @@ class Feature:
         if fit == schema.LEAST_SQUARES:
             return self
         design = self.design[: len(self.residual_mm)]
-        step = fit_extreme(design, self.residual_mm, fit) * float(self.residual_mm.any())
+        step = fit_extreme(design, self.residual_mm, fit)
+        if not self.residual_mm.any():
+            step[:] = 0.0
         residual = self.residual_mm + design @ step
         return replace(self, shape=self.shape.move(step), residual_mm=residual, fit=fit)
 
@@ -167,7 +169,7 @@ def fit_shape(start: FeatureShape, point_mm: Array, shares: Array | None = None)
     shape, root = start, np.sqrt(np.ones(len(point_mm)) if shares is None else shares)
     for _ in range(STEPS):
         distance, _, design = shape.respond(point_mm)
-        step = -np.linalg.lstsq(design * root[:, None], distance * root, RANK_TOLERANCE)[0]
+        step: Any = -np.linalg.lstsq(design * root[:, None], distance * root, RANK_TOLERANCE)[0]
         shape = shape.move(step)
         if not STILL_MM < np.abs(design @ step).max() < FAR_MM:
             break
