@@ -195,15 +195,15 @@ def fit_extreme(design: Array, distance_mm: Array, fit: str) -> Array:
     signs = {"inscribed": (-1.0,), "circumscribed": (1.0,)}.get(fit, (1.0, -1.0))
     zone = np.full((len(rows), 1), -1.0 if len(signs) == 2 else 0.0)
     goal = np.append(basis[6] * signs[0] * (len(signs) == 1), -zone[0])
-    result = linprog(
+    solution = linprog(
         goal,
         np.vstack([np.hstack([sign * rows, zone]) for sign in signs]),
         np.concatenate([sign * limit for sign in signs]),
         bounds=[(None, None)] * is_free.sum() + [(0.0, None)],
     )
-    if result.x is None:
+    if solution.x is None:
         raise OptionError(f"points on one side do not determine its {fit} fit")
-    return basis @ result.x[:-1] * MM_PER_UM
+    return basis @ solution.x[:-1] * MM_PER_UM
 
 
 def find_features(fine: Workpiece, noise_um: float = SCAN_NOISE_UM) -> dict[str, Feature]:
