@@ -224,3 +224,21 @@ def test_named_features_are_fitted_as_stated():
 def test_fits_that_do_not_exist_are_refused(text, message):
     with pytest.raises(SceneError, match=message):
         cut(RING, f"[[features]]\n{text}\n")
+
+
+BOX = make.box((100.0, 60.0, 20.0))
+DIALECTS = {
+    "solid.stl": b"solid".ljust(80) + BOX.export(file_type="stl")[80:],
+    "upper.stl": BOX.export(file_type="stl_ascii").upper().encode(),
+    "big.ply": BOX.export(file_type="ply"),
+    "quad.obj": BOX.export(file_type="obj").encode(),
+    "spare.stl": BOX.export(file_type="stl") + b"17 spare bytes...",
+}
+
+
+@pytest.mark.parametrize("name", DIALECTS)
+def test_one_box_has_one_deviation_in_all_dialects(name, tmp_path):
+    (tmp_path / name).write_bytes(DIALECTS[name])
+    made = Part(file=str(tmp_path / name)).run(load_scene("dvf5000_first"), ignore_progress)
+    assert made.deviation.max_um == pytest.approx(27.9942, abs=1e-4)
+    assert any("17 bytes after" in text for text in made.caveats()) == (name == "spare.stl")
