@@ -165,8 +165,9 @@ def read_bytes(path: Path, limit_bytes: int, source: str | None = None) -> bytes
     source = source or str(path)
     check_file(path, limit_bytes, source)
     try:
+        size = path.stat().st_size or limit_bytes  # `read` allocates all that it may return
         with path.open("rb") as file:
-            content = file.read(limit_bytes + 1)
+            content = file.read(min(size, limit_bytes) + 1)
     except OSError as error:
         raise SceneError(source, [f"cannot be read: {error.strerror or error}"]) from None
     if len(content) > limit_bytes:  # some system files report a size of zero
