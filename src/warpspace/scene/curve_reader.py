@@ -1,10 +1,9 @@
 """Readers of the curves of errors in scene files, and sums of curves."""
 
-import io
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import TextIO, cast
 
 import numpy as np
 
@@ -136,7 +135,6 @@ def _sampled(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> T
 GUIDES = "guides"  # key of the positioning errors of the two guides of a gantry
 RUN, DIRECTION = "run", "direction"  # columns that a file of runs may have
 SIGNS = {1: FORWARD, -1: BACKWARD}
-T = TypeVar("T")
 
 
 def read_csv_column(path: Path, column: str) -> list[tuple[float, float]]:
@@ -149,13 +147,14 @@ def read_csv_runs(path: Path, column: str) -> tuple[TravelRun, ...]:
     return _read_csv(path, lambda rows: _runs(rows, column))
 
 
-def _read_csv(path: Path, read: Callable[[text_files.CsvRows], T]) -> T:
-    source = str(path)
-    text, _ = text_files.read_table_text(path, limits.MAX_CSV_BYTES)
-    rows = text_files.CsvRows(io.StringIO(text, newline=""), source, limits.MAX_POINTS)
-    content = read(rows)
-    rows.check()
-    return content
+def _read_csv(path: Path, read: Callable[[text_files.CsvRows], text_files.T]) -> text_files.T:
+    def parse(file: TextIO) -> text_files.T:
+        rows = text_files.CsvRows(file, str(path), limits.MAX_POINTS)
+        content = read(rows)
+        rows.check()
+        return content
+
+    return text_files.parse_table_file(path, limits.MAX_CSV_BYTES, parse)
 
 
 def _column(rows: text_files.CsvRows, column: str) -> tuple[int, float]:

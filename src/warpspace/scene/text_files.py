@@ -9,13 +9,13 @@ import sys
 import time as clock
 import tomllib
 import zipfile
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from datetime import date, time
 from importlib import import_module
 from itertools import chain
 from pathlib import Path
-from typing import TextIO
+from typing import TextIO, TypeVar
 
 from warpspace.exceptions import OutputError, SceneError
 from warpspace.machine import limits
@@ -24,6 +24,7 @@ if sys.platform != "win32":
     import fcntl
 
 LOCK_WAIT_S = 60.0
+T = TypeVar("T")
 
 # The memory of a TOML reader grows with the square of the parts of one key, and with each table.
 # One pass over the text, in linear time, counts both.
@@ -89,8 +90,25 @@ def read_table_text(path: Path, limit_bytes: int) -> tuple[str, tuple[str, ...]]
     return decode_text(read_bytes(path, limit_bytes), str(path))
 
 
+def parse_table_file(path: Path, limit_bytes: int, parse: Callable[[TextIO], T]) -> T:
+    """Parse a table in any encoding; UTF-8 is read line by line, in bounded memory."""
+    check_file(path, limit_bytes, str(path))
+    try:
+        with path.open("rb") as file:
+            sample = file.read(_SAMPLE_BYTES)
+        if not (sample.startswith(SPREADSHEET) or _utf16(sample)):
+            with path.open(encoding="utf-8-sig", newline="") as file:
+                return parse(file)
+    except UnicodeDecodeError:
+        pass
+    except OSError as error:
+        raise SceneError(str(path), [f"cannot be read: {error.strerror or error}"]) from None
+    return parse(io.StringIO(read_table_text(path, limit_bytes)[0], newline=""))
+
+
 SPREADSHEET = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """First bytes of .xlsx and .ods, and of .xls."""
+_SAMPLE_BYTES = 4096
 _UTF16_SHARE = 0.3
 """Smallest share of zero bytes at every other position of UTF-16 without a byte order mark."""
 
@@ -150,7 +168,7 @@ def _sheet_text(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
 def _utf16(content: bytes) -> str:
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
-    sample = content[:4096]
+    sample = content[:_SAMPLE_BYTES]
     half = len(sample) // 2
     if half < 2:
         return ""
@@ -523,10 +541,12 @@ class CsvRows:
             self._since_row = 0
             candidate = next(lines, "")
         ahead.append((self._number, candidate))
+        self._since_row = 0
         return first, chain(self._replay(ahead), lines)
 
     def _replay(self, ahead: Sequence[tuple[int, str]]) -> Iterator[str]:
         for self._number, line in ahead:
+            self._count_row_line()
             yield line
 
     def _merge_units(self) -> None:
@@ -631,10 +651,13 @@ class CsvRows:
                 raise SceneError(self.source, [problem])
             if not self._since_row and line.lstrip().startswith("#"):
                 continue
-            self._since_row += 1
-            if self._since_row > _MAX_LINES_OF_ROW:
-                raise csv.Error("a quoted text does not end")
+            self._count_row_line()
             yield line
+
+    def _count_row_line(self) -> None:
+        self._since_row += 1
+        if self._since_row > _MAX_LINES_OF_ROW:
+            raise csv.Error("a quoted text does not end")
 
     def _first(self, lines: Iterator[str]) -> str:
         for line in lines:
