@@ -331,6 +331,8 @@ _TURN_RAD = 1.001 * math.tau
 _WHOLE_DEG = 0.02
 _MAX_LINES_OF_ROW = 20  # lines of one row, with line breaks in texts
 _NUMBER = re.compile(r"[+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?", re.ASCII)
+_BLANKS = re.compile(r"\s+(?![\[(])")
+"""Blanks between headings, not those before a unit."""
 _SEP = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
 _UNIT = str.maketrans({"µ": "u", "μ": "u", "°": "deg"})
 Row = tuple[int, list[str]]
@@ -372,8 +374,10 @@ ANGLE_URAD: Mapping[str, float] = {
 POSITION_UNITS = {"mm", "m", "in", "inch", "deg", "rad"}
 """Units of positions; a short heading such as x_mm is no deviation x_um."""
 DIRECTIONS: Mapping[str, int] = {
-    **dict.fromkeys(("+", "1", "+1", "↑", "forward", "forwards", "fwd", "positive"), 1),
-    **dict.fromkeys(("-", "−", "-1", "↓", "backward", "backwards", "reverse", "rev"), -1),
+    **dict.fromkeys(("+", "1", "+1", "↑", "forward", "forwards", "fwd", "positive", "vorwärts"), 1),
+    **dict.fromkeys(
+        ("-", "−", "-1", "↓", "backward", "backwards", "reverse", "rev", "rückwärts"), -1
+    ),
     "negative": -1,
 }
 """Directions of travel in tables, in lower case."""
@@ -434,6 +438,21 @@ def plain_heading(text: str) -> str:
     return bare
 
 
+GERMAN = {
+    "abweichung": "deviation",
+    **dict.fromkeys(("sollposition", "zielposition"), "target"),
+    "richtung": "direction",
+    "lauf": "run",
+}
+"""Headings by their German spelling."""
+
+
+def translate_heading(heading: str) -> str:
+    """Translate a German heading of a table of readings, with or without a unit."""
+    name = re.split(r"[\[(_]", heading, maxsplit=1)[0]
+    return GERMAN.get(name.strip().lower(), name) + heading[len(name) :]
+
+
 def radian_notes(columns: Mapping[str, Sequence[float]]) -> tuple[str, ...]:
     """List columns ``…_deg`` that look like radians: a full turn, or whole degrees, of them."""
     notes: list[str] = []
@@ -478,16 +497,30 @@ MAX_PREAMBLE = 40  # lines above the header
 MIN_RUN_COLUMNS = 2
 DEVIATION = "deviation"
 """Heading of readings in columns of runs that state no unit."""
-_RUN_HEADING = re.compile(r"(?:run\s*)?(\d+)\s*([^\d\s\[(]+)\s*(\[.*\]|\(.*\))?", re.IGNORECASE)
+_RUN_HEADING = re.compile(
+    r"(?:(?:run|lauf)\s*)?(\d+)\s*([^\d\s\[(]+)\s*(\[.*\]|\(.*\))?", re.IGNORECASE
+)
 
 
 def _mark(line: str) -> str:
     bare = re.sub(r'"[^"]*("|$)', "", line)
-    return next((mark for mark in MARKS if mark in bare), ",")
+    headings = _BLANKS.split(line.strip())
+    has_blanks = len(headings) > 1 and all(
+        heading_unit(name) or name.lower() in ("run", "direction") for name in headings
+    )
+    return next((mark for mark in MARKS if mark in bare), " " if has_blanks else ",")
 
 
 def _cells(line: str, mark: str) -> list[str]:
-    return [cell.strip().strip('"') for cell in line.split(mark)]
+    cells = _BLANKS.split(line.strip()) if mark == " " else line.split(mark)
+    return [cell.strip().strip('"') for cell in cells]
+
+
+def _run(text: str) -> tuple[str, str] | None:
+    """Return run and direction of a heading such as ``2 ↑`` or ``run 2 backward``."""
+    match = _RUN_HEADING.fullmatch(text)
+    way = match[2].strip() if match else ""
+    return (match[1], way) if match and way.lower() in DIRECTIONS else None
 
 
 class CsvRows:
@@ -497,6 +530,7 @@ class CsvRows:
         self.source, self.problems = source, list[str]()
         self._file, self._max_rows, self._unique = file, max_rows, unique
         self._number = self._since_row = self._width = 0
+        self._has_run_rows = False
         self._signs: dict[str, str] = {}
         self._repeated: list[str] = []
         self._remarks: list[str] = []
@@ -515,7 +549,7 @@ class CsvRows:
             self.header.pop()
         self._trails = width > len(self.header) or self.mark != ","
         self._merge_units()
-        self.runs = self._runs_in_columns()
+        self.runs = self._runs_in_columns() or self._runs_in_rows()
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -565,15 +599,11 @@ class CsvRows:
         else:
             self._rows = chain([row], self._rows)
 
-    def _runs_in_columns(self) -> dict[int, tuple[str, str]]:
+    def _runs_in_columns(self) -> dict[int, tuple[str, ...]]:
         """Return run and direction of each column of readings; such columns become rows."""
-        runs: dict[int, tuple[str, str]] = {}
-        units = set[str]()
-        for index, heading in enumerate(self.header):
-            match = _RUN_HEADING.fullmatch(heading)
-            if match and match[2].strip().lower() in DIRECTIONS:
-                runs[index] = match[1], match[2].strip()
-                units.add((match[3] or "").strip("[]() "))
+        pairs = {index: _run(heading) for index, heading in enumerate(self.header)}
+        runs: dict[int, tuple[str, ...]] = {index: run for index, run in pairs.items() if run}
+        units = {heading_unit(re.sub(r"\s*([\[(])", r"x\1", self.header[at])) for at in runs}
         if len(runs) < MIN_RUN_COLUMNS or len(units) > 1:
             return {}
         self._remarks.append(f"{len(runs)} runs in columns")
@@ -583,9 +613,20 @@ class CsvRows:
         self.header = [*headings, "run", "direction", f"deviation [{unit}]" if unit else DEVIATION]
         return runs
 
+    def _runs_in_rows(self) -> dict[int, tuple[str, ...]]:
+        """Return the position of each column of readings where each row is a run."""
+        positions = {index: (cell,) for index, cell in enumerate(self.header) if index}
+        is_run = positions and all(_is_number(cell) for (cell,) in positions.values())
+        if not is_run or not heading_unit(self.header[0]):
+            return {}
+        self._remarks.append("runs in rows")
+        self._width, self._has_run_rows = len(self.header), True
+        self.header = [self.header[0], "run", "direction", DEVIATION]
+        return positions
+
     def __iter__(self) -> Iterator[Row]:
         """Return the rows below the header that have as many cells."""
-        width = self._width if self.runs else len(self.header)
+        width = self._width or len(self.header)
         first_lines: dict[tuple[str, ...], int] = {}
         for count, (line, cells) in enumerate(self._rows):
             if count >= self._max_rows:
@@ -601,12 +642,20 @@ class CsvRows:
             elif self._unique and first_lines.setdefault(tuple(cells), line) != line:
                 self._repeated.append(f"line {line} is line {first_lines[tuple(cells)]} again")
             elif self.runs:
-                conditions = [cell for index, cell in enumerate(cells) if index not in self.runs]
-                for index, run in self.runs.items():
-                    if cells[index]:
-                        yield line, [*conditions, *run, cells[index]]
+                yield from self._readings_of_row(line, cells)
             else:
                 yield line, cells
+
+    def _readings_of_row(self, line: int, cells: Sequence[str]) -> Iterator[Row]:
+        before: Sequence[str] = [cell for at, cell in enumerate(cells) if at not in self.runs]
+        run = _run(before[0]) if self._has_run_rows else None
+        if self._has_run_rows and run is None:
+            self.note(f"line {line}: {spell_value(before[0])}; expected a run such as 2 ↑")
+            return
+        for index, condition in self.runs.items():
+            labels = [*condition, *run] if run else [*before, *condition]
+            if cells[index]:
+                yield line, [*labels, cells[index]]
 
     def number(
         self, text: str, line: int, what: str = "", limit: float = math.inf, hint: str = ""
@@ -667,6 +716,8 @@ class CsvRows:
         return ""
 
     def _split(self, lines: Iterator[str]) -> Iterator[Row]:
+        if self.mark == " ":
+            lines = (" ".join(re.sub(r"\s+(?=[\[(])", "", line).split()) for line in lines)
         try:
             for row in csv.reader(lines, delimiter=self.mark, strict=True):
                 self._since_row = 0

@@ -345,6 +345,12 @@ SHEETS = {
     )).encode(),
     "runs in columns": WIDE.encode(),
     "runs in columns with unit": WIDE.replace("↑", " + [µm]").replace("↓", " - [µm]").encode(),
+    "runs in rows": "\n".join([
+        "Target [mm];" + ";".join(map(str, TARGETS)),
+        *(f"{run} {way};" + ";".join(map(str, values)) for (run, way), values in RUNS.items()),
+    ]).encode(),
+    "blanks": sheet("run direction target_mm deviation [um]").replace(",", "  ").encode(),
+    "headings in German": sheet("Lauf,Richtung,Sollposition [mm],Abweichung [µm]").encode(),
     "preamble": f"Report;laser\nDate;2024-05-01\n\n{WIDE}".encode(),
 }  # fmt: skip
 
@@ -375,6 +381,31 @@ def test_laser_sheets_that_are_not_understood_are_refused(text, message, tmp_pat
     path.write_text(text, encoding="utf-8")
     with pytest.raises(SceneError, match=message):
         run_test(scene_with(), find_test("positioning")(axis="X"), path)
+
+
+@pytest.mark.parametrize(
+    ("text", "position"),
+    [
+        ("Position X [mm];Abweichung [µm]\n0;0\n100;1,5\n", 100.0),
+        ("X [mm] EXX [um]\n0 0\n1 1.5", 1.0),
+    ],
+)
+def test_headings_with_blanks_and_in_german(text, position):
+    (exx,) = read(text, "x.csv").series
+    assert (exx.key, exx.positions) == ("EXX", (0.0, position))
+    assert exx.values == pytest.approx([0.0, 1.5])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("Target [mm];0;100\n1↑;0;1\nmean;0;1\n", 'line 3: "mean"; expected a run such as 2 ↑'),
+        ("Target [mm];0;100\n1↑;0;1;2\n", "line 2: 4 fields; expected 3"),
+    ],
+)
+def test_runs_in_rows_that_are_not_understood_are_refused(text, message):
+    with pytest.raises(SceneError, match=message):
+        read(text, "laser.csv", axis="X")
 
 
 def test_a_sheet_without_its_axis_asks_for_it():

@@ -123,6 +123,9 @@ _HEADING = re.compile(
     r"(?:(u)\s*\(\s*)?([A-Za-z0-9]+)\s*\)?\s*"
     r"(?:\[\s*([^\]]+?)\s*\]|\(\s*([^)]+?)\s*\)|_([A-Za-zµμ°/]+))?"
 )
+_AXIS_POSITION = re.compile(
+    r"^(?:target|position|sollposition|zielposition)\s+(?=[XYZABCUVW]\s*[\[(_])", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True)
@@ -176,10 +179,15 @@ def recognise(head: str, name: str) -> bool:
         rows = source_of_text(head, name).rows(1)
     except SceneError:
         return False
-    matches = [match for match in map(_heading, rows.header) if match]
+    matches = [match for match in map(_heading, map(_plain, rows.header)) if match]
     has_unit = any(match[3] or match[4] or match[5] for match in matches)
     names = {match[2].upper() for match in matches}
     return has_unit and bool(rows.runs or "DEVIATION" in names or names & PARAMETERS.keys())
+
+
+def _plain(heading: str) -> str:
+    """Translate a heading; ``Position X [mm]`` is the position ``X [mm]``."""
+    return _AXIS_POSITION.sub("", text_files.translate_heading(heading))
 
 
 def _heading(text: str) -> re.Match[str] | None:
@@ -189,8 +197,12 @@ def _heading(text: str) -> re.Match[str] | None:
 def _columns(at: SourceLine, rows: CsvRows, options: ReadOptions) -> tuple[_CsvColumn, ...]:
     headings = [
         f"{heading} [um]" if rows.runs and heading == text_files.DEVIATION else heading
-        for heading in rows.header
+        for heading in map(_plain, rows.header)
     ]
+    names = [match[2].upper() for match in map(_heading, headings) if match]
+    axes = [name for name in names if is_axis_name(name)]
+    if not options.axis and len(axes) == 1:
+        options = replace(options, axis=axes[0])
     columns = [_column(at, heading, options) for heading in headings]
     keys = [(column.role, column.name) for column in columns if column.role != IGNORED]
     repeated = next((name for role, name in keys if keys.count((role, name)) > 1), None)
