@@ -113,14 +113,14 @@ _UTF16_SHARE = 0.3
 """Smallest share of zero bytes at every other position of UTF-16 without a byte order mark."""
 
 
-def decode_text(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
+def decode_text(content: bytes, name: str, errors: str = "strict") -> tuple[str, tuple[str, ...]]:
     """Decode text in UTF-8, UTF-16 or Windows-1252, or a spreadsheet, with notes."""
     if content.startswith(SPREADSHEET):
         return _sheet_text(content, name)
     encoding = _utf16(content)
     if encoding:
         try:
-            return content.decode(encoding), ("read as UTF-16",)
+            return content.decode(encoding, errors), ("read as UTF-16",)
         except UnicodeDecodeError:
             problem = "begins as UTF-16 text, but is not valid; expected a text file"
             raise SceneError(name, [problem]) from None
@@ -128,7 +128,7 @@ def decode_text(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
         return content.decode("utf-8-sig"), ()
     except UnicodeDecodeError as error:
         try:
-            text = content.decode("cp1252")
+            text = content.decode("cp1252", errors)
         except UnicodeDecodeError:
             problem = f"is not text in UTF-8, UTF-16 or Windows-1252 (byte {error.start})"
             raise SceneError(name, [f"{problem}; expected a text file"]) from None
