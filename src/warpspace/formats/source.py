@@ -3,7 +3,7 @@
 import io
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NoReturn
 
@@ -172,6 +172,19 @@ class SourceLine:
     def ascending(self, value: float, before: float, quantity: str, of: str = "") -> None:
         if value <= before:
             self.refuse(f"{quantity} {value:g}{of} after {before:g}", "ascending positions")
+
+
+MAX_LISTED = 6  # lines that are not read, in a note
+
+
+def unread_notes(lines: Sequence[SourceLine]) -> tuple[str, ...]:
+    """Return a note on the lines of a file that contain no error; none without such lines."""
+    if not lines:
+        return ()
+    listed = ", ".join(f"line {at.line} {at.quoted}" for at in lines[:MAX_LISTED])
+    rest = len(lines) - MAX_LISTED
+    more = f" and {rest:,} more" if rest > 0 else ""
+    return (f"{lines[0].source.base}: ignored {listed}{more}",)
 
 
 def unit_list(factors: Mapping[str, float]) -> str:
