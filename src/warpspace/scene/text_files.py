@@ -334,7 +334,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?", re.ASCII)
 _BLANKS = re.compile(r"\s+(?![\[(])")
 """Blanks between headings, not those before a unit."""
 _SEP = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
-_UNIT = str.maketrans({"µ": "u", "μ": "u", "°": "deg"})
+UNIT_SPELLING = str.maketrans({"µ": "u", "μ": "u", "°": "deg", **dict.fromkeys('"″', "arcsec")})
 Row = tuple[int, list[str]]
 """Number of the last line of a row, and its cells without surrounding blanks."""
 
@@ -364,13 +364,17 @@ LENGTH_UM: Mapping[str, float] = {
     **dict.fromkeys(("in", "inch"), 25_400.0),
     "thou": 25.4,
 }
+"""Micrometres per unit of length."""
 ANGLE_URAD: Mapping[str, float] = {
     "urad": 1.0,
     "mrad": 1e3,
     "rad": 1e6,
     "arcsec": math.pi / 180.0 / 3600.0 * 1e6,
     "deg": math.pi / 180.0 * 1e6,
+    "um/m": 1.0,
+    "mm/m": 1e3,
 }
+"""Microradians per unit of angle."""
 POSITION_UNITS = {"mm", "m", "in", "inch", "deg", "rad"}
 """Units of positions; a short heading such as x_mm is no deviation x_um."""
 DIRECTIONS: Mapping[str, int] = {
@@ -434,7 +438,7 @@ def plain_heading(text: str) -> str:
     for opening, closing in ("[]", "()"):
         name, _, unit = bare[:-1].rpartition(opening)
         if bare.endswith(closing) and name.strip() and unit.strip() and not {*"[]()"} & {*unit}:
-            return f"{name.rstrip()}_{unit.strip().translate(_UNIT)}"
+            return f"{name.rstrip()}_{unit.strip().translate(UNIT_SPELLING)}"
     return bare
 
 
@@ -519,8 +523,8 @@ def _cells(line: str, mark: str) -> list[str]:
 def _run(text: str) -> tuple[str, str] | None:
     """Return run and direction of a heading such as ``2 ↑`` or ``run 2 backward``."""
     match = _RUN_HEADING.fullmatch(text)
-    way = match[2].strip() if match else ""
-    return (match[1], way) if match and way.lower() in DIRECTIONS else None
+    direction = match[2].strip() if match else ""
+    return (match[1], direction) if match and direction.lower() in DIRECTIONS else None
 
 
 class CsvRows:
@@ -590,7 +594,7 @@ class CsvRows:
         row = next(self._rows, None)
         if row is None:
             return
-        units = [cell.strip("[]()").translate(_UNIT) for cell in row[1]]
+        units = [cell.strip("[]()").translate(UNIT_SPELLING) for cell in row[1]]
         if len(units) == len(self.header) and all(
             unit_factor(unit, unit) for unit in units if unit
         ):

@@ -15,19 +15,16 @@ from warpspace.formats.registry import Files, Format, ReadOptions, describe
 from warpspace.formats.source import (
     DEG_PER,
     MM_PER,
-    UM_PER,
-    URAD_PER,
     Source,
     SourceLine,
     format_number,
     quote,
     source_of_text,
-    unit_list,
 )
 from warpspace.machine.axes import PARAMETERS, is_axis_name, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
 from warpspace.scene import text_files
-from warpspace.scene.text_files import CsvRows, unguard_cell
+from warpspace.scene.text_files import ANGLE_URAD, LENGTH_UM, CsvRows, unguard_cell
 from warpspace.units import Array
 
 RUN, DIRECTION = "run", "direction"
@@ -230,7 +227,7 @@ def _column(at: SourceLine, heading: str, options: ReadOptions) -> _CsvColumn:
         name = axis if GENERIC[name] == POSITION else f"E{along}{axis}"
     unit = (matched[3] or matched[4] or matched[5] or "").strip()
     if name in PARAMETERS:
-        factors = URAD_PER if parameter(name).is_rotation else UM_PER
+        factors = ANGLE_URAD if parameter(name).is_rotation else LENGTH_UM
         role = UNCERTAINTY if uncertain else ERROR
     elif is_axis_name(name) and not uncertain:
         factors, role = MM_PER if is_linear(name) else DEG_PER, POSITION
@@ -240,8 +237,8 @@ def _column(at: SourceLine, heading: str, options: ReadOptions) -> _CsvColumn:
         expected = f"an axis, an error, u(error), run or direction{hint}"
         at.refuse(f"column {quote(heading)}", expected)
     if not unit:
-        units = unit_list(factors)
-        at.refuse(f"column {name} has no unit", f"{name} [unit], with one of {units}")
+        expected = f"{name} [unit], with one of {', '.join(factors)}"
+        at.refuse(f"column {name} has no unit", expected)
     return _CsvColumn(role, name, at.unit(unit, factors, name), unit)
 
 

@@ -106,12 +106,12 @@ def _rows(source: Source, per_unit: float, notes: list[str]) -> np.ndarray:
             if not rows:
                 problem = f"LinuxCNC stops here, at {at.quoted}, without a table"
                 at.refuse(problem, "three numbers: nominal forward reverse")
-            rest = [
+            unread = [
                 source.at(n)
                 for n, text in enumerate(source.lines, 1)
                 if n >= number and text.strip()
             ]
-            notes += [f"{note}: LinuxCNC stops at line {number}" for note in unread_notes(rest)]
+            notes += [f"{note}: LinuxCNC stops at line {number}" for note in unread_notes(unread)]
             break
         if match[4].strip():
             notes.append(

@@ -250,7 +250,7 @@ def _unread(source: Source) -> tuple[str, ...]:
         f"{source.base}: ignored [bed_mesh]: the shape of the bed, not an error of an axis"
         for _ in sections.keys() & {"bed_mesh"}
     ]
-    others: list[SourceLine] = []
+    unread_lines: list[SourceLine] = []
     is_outside = True
     for at, bare in source.scan(";"):
         heading = _SECTION.fullmatch(bare.removeprefix("#*#").strip())
@@ -260,8 +260,8 @@ def _unread(source: Source) -> tuple[str, ...]:
         else:
             is_read = not is_outside or bare.startswith("#") or _COMMAND.search(bare)
         if not is_read:
-            others.append(at)
-    notes += unread_notes(others)
+            unread_lines.append(at)
+    notes += unread_notes(unread_lines)
     for name, expression in ((TWIST, _TWIST_KEY), ("skew_correction", _SAVED_KEY)):
         unread = [key for key in sections.get(name, {}) if not expression.fullmatch(key)]
         if unread:
