@@ -12,7 +12,7 @@ from warpspace.bench.base import find_test, run_test
 from warpspace.calibration.readings import parse_reading_table
 from warpspace.exceptions import SceneError
 from warpspace.formats.measured import BACKWARD, FORWARD
-from warpspace.formats.registry import ReadOptions, open_files, read_errors
+from warpspace.formats.registry import ReadOptions, open_files, read_errors, recognise
 from warpspace.formats.source import source_of_text
 from warpspace.formats.to_scene import build_imported_scene
 from warpspace.kinematics.chain import loop_error, nominal_point
@@ -291,6 +291,33 @@ def test_linuxcnc_guides_without_their_distance_or_file(names, has_machine, mess
 def test_linuxcnc_tables_of_the_other_type_are_refused(variant, text, message):
     with pytest.raises(SceneError, match=message):
         read(text, "x.comp", axis="X", variant=variant)
+
+
+FOREIGN = {
+    "points.xyz": "1 2 3\n4 -5 6\n7 8 9\n",
+    "x.comp": "a screw\n",
+    "m.COM": "BEGIN PGM 1 MM\nL X+1\n",
+    "m.cma": "some text\n",
+    "x.tab": "a,b\n1,2\n",
+    "x.map": "0 1 2\n5 9 1\n",
+    "x.rtl": "HEADER\n",
+    "m.gcode": "G1 X1\n",
+    "m.hal": "loadrt trivkins\n",
+    "printer.cfg": "[stepper_x]\n",
+    "config.g": "M92 X80\n",
+    "v.exc": "1;2\n",
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_a_file_is_not_recognised_by_its_ending(name):
+    with pytest.raises(SceneError, match="matches no known format"):
+        recognise([source_of_text(FOREIGN[name], name)])
+
+
+def test_a_file_is_recognised_under_another_ending():
+    assert recognise([source_of_text("BEGIN X.CMA MM\n", "x.tab")]).name == "heidenhain"
+    assert recognise([source_of_text(COMP["x.comp"], "x.map")]).name == "linuxcnc-comp"
 
 
 def test_linuxcnc_settings_that_are_not_read_are_reported():

@@ -58,7 +58,26 @@ def _is_comp(head: str, name: str) -> bool:
     rows = [line for line in head.splitlines() if line.strip()]
     if name.lower().endswith(".comp"):
         return any(map(_ROW.match, rows))
-    return len(rows) > 1 and all(map(_ROW.match, rows))
+    matches = [match for match in map(_ROW.match, rows) if match]
+    if len(matches) < max(len(rows), 2):
+        return False
+    numbers = np.array([match.groups()[:3] for match in matches], float)
+    is_near = _follows(numbers) or _stays(numbers)
+    return is_near and bool(np.all(np.diff(numbers[:, 0]) > 0.0))
+
+
+def _span(rows: np.ndarray) -> float:
+    return max(np.ptp(rows[:, 0]), abs(rows[:, 0]).max(), 1e-9)
+
+
+def _follows(rows: np.ndarray) -> bool:
+    """Return true for actual positions: near the nominal ones."""
+    return bool(np.abs(rows[:, 1:] - rows[:, :1]).max() < NEAR * _span(rows))
+
+
+def _stays(rows: np.ndarray) -> bool:
+    """Return true for corrections: near zero."""
+    return bool(np.abs(rows[:, 1:]).max() <= NEAR * _span(rows))
 
 
 _READ_SECTIONS = ("[TRAJ]", "[KINS]", "[END]")
@@ -128,9 +147,7 @@ def _rows(source: Source, per_unit: float, notes: list[str]) -> np.ndarray:
 
 
 def _kind(source: Source, rows: np.ndarray, stated: str) -> tuple[str, tuple[str, ...]]:
-    span = max(np.ptp(rows[:, 0]), abs(rows[:, 0]).max(), 1e-9)
-    follows = np.abs(rows[:, 1:] - rows[:, :1]).max() < NEAR * span
-    stays = np.abs(rows[:, 1:]).max() <= NEAR * span
+    follows, stays = _follows(rows), _stays(rows)
     if (stated == OFFSETS and follows and not stays) or (
         stated == POSITIONS and stays and not follows
     ):
@@ -139,7 +156,7 @@ def _kind(source: Source, rows: np.ndarray, stated: str) -> tuple[str, tuple[str
         source.refuse(f"looks like {contents}, but is {stated}", f"{stated} (is it {other}?)")
     if stated:
         return stated, ()
-    kind = POSITIONS if follows and np.abs(rows[:, 1]).max() > NEAR * span else OFFSETS
+    kind = POSITIONS if follows and np.abs(rows[:, 1]).max() > NEAR * _span(rows) else OFFSETS
     description = "actual positions (type 0)" if kind == POSITIONS else "offsets (type 1)"
     return kind, (f"second and third column: {description}; --variant selects the other type",)
 
