@@ -10,6 +10,7 @@ import pytest
 from bench_scenes import scene_with
 from warpspace.bench.base import find_test, run_test
 from warpspace.calibration.readings import parse_reading_table
+from warpspace.calibration.registry import parse_readings
 from warpspace.exceptions import SceneError
 from warpspace.formats.measured import BACKWARD, FORWARD
 from warpspace.formats.registry import ReadOptions, open_files, read_errors, recognise
@@ -137,6 +138,11 @@ def test_klipper_probes_by_their_offset(probe):
     imported = read(text, "printer.cfg")
     assert [error.key for error in imported.series] == ["EAX"]
     assert any("ignored zy_compensations: x_offset 0 mm" in note for note in imported.notes)
+
+
+def test_klipper_heights_with_a_decimal_comma_are_refused():
+    with pytest.raises(SceneError, match="line 7: z_compensations -0,030000"):
+        read(TWIST.replace("= -0.03", "= -0,03"), "printer.cfg")
 
 
 def test_klipper_twist_with_two_probes_is_refused():
@@ -466,6 +472,19 @@ def test_calibration_ignores_columns_that_it_does_not_need():
     assert table.require(("j1_deg", "x_mm"))[0] == pytest.approx([np.rad2deg(1.5), 2.0])
     with pytest.raises(SceneError, match='line 2, pt: "P1"; expected a finite number'):
         table.require(("pt",))
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg", "axis positions only.*closed loop"),
+        ("Timestamp,shoulder_pan_joint,x_mm,y_mm,z_mm", "has no column j1_deg, j2_deg.*shoulder_"),
+    ],
+)
+def test_robot_readings_without_positions_or_joints_are_refused(header, message):
+    row = ",".join("1" for _ in header.split(","))
+    with pytest.raises(SceneError, match=message):
+        parse_readings(f"{header}\n{row}\n", "r.csv", load_scene("ur10"), "positions")
 
 
 def xlsx(rows):

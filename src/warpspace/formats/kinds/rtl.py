@@ -159,7 +159,8 @@ def _read_one(source: Source, options: ReadOptions) -> measured.ImportedErrors:
     key = f"E{'XYZ'['XYZUVW'.index(axis[0]) % 3]}{axis}"
     series = measured.ErrorSeries(key, tuple(float(targets[index]) for index in order), runs)
     air = [text for _, text in sections.get("ENVIRONMENT", [])]
-    notes = (*source.notes, *unread)
+    header = [at for at, text in sections.get("HEADER", []) if _pair(text) is None]
+    notes = (*source.notes, *unread_notes(header), *unread)
     if air:
         notes += (f"environment: {'; '.join(air)}",)
     assumed = (INFERRED, ONE_WAY) if unidirectional else (INFERRED,)

@@ -195,6 +195,8 @@ def _twist(source: Source, options: ReadOptions) -> ImportedErrors | None:
             continue
         at, text = twist[heights_key]
         options.axis_named(axis.upper(), at)
+        if len({*re.findall(r",\s*", text)}) > 1:
+            at.refuse(f"{heights_key} {text}", "numbers with a point, all separated alike")
         heights = [at.number(part, heights_key) for part in text.split(",")]
         ends = [_twist_end(twist, f"{end}_{axis}", at) for end in ("start", "end")]
         if len(heights) < 2 or ends[1] <= ends[0]:
