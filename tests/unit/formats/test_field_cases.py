@@ -299,6 +299,24 @@ def test_linuxcnc_tables_of_the_other_type_are_refused(variant, text, message):
         read(text, "x.comp", axis="X", variant=variant)
 
 
+NAMED = {
+    "a list of Renishaw": "Renishaw compensation\nCompensation type: Mean\n",
+    "pitch error data of FANUC": "%\nN10000 Q1 P0\nN10001 Q1 P-1\nN03620 Q0 A1 P1 A2 P40\n%\n",
+    "a screw compensation table of Centroid": "24 -1448819\n0\n-32\n-38\n",
+    "a HEIDENHAIN digital readout": "#\nND-280 MM\nAXIS X1 = 0\n",
+    "an EasyRoute control": "unit = mm\n[X]\n0, 0.000, 0.010\n",
+    "a screw map of Mach3": "-10.0,-10.001\n0,0\n10,10.002\n",
+    "a compensation value list of ISG": "kopf.log_achs_nr 2\nkw.ssfk.unit 1\n",
+    "a bed mesh of Klipper": "[bed_mesh]\n",
+}
+
+
+@pytest.mark.parametrize("title", NAMED)
+def test_a_file_that_is_not_read_is_named_with_an_alternative(title):
+    with pytest.raises(SceneError, match=f"{title}.*; expected another file: .+"):
+        read(NAMED[title], "x.dat", axis="X")
+
+
 FOREIGN = {
     "points.xyz": "1 2 3\n4 -5 6\n7 8 9\n",
     "x.comp": "a screw\n",
