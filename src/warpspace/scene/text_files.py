@@ -520,11 +520,12 @@ def _cells(line: str, mark: str) -> list[str]:
     return [cell.strip().strip('"') for cell in cells]
 
 
-def _run(text: str) -> tuple[str, str] | None:
-    """Return run and direction of a heading such as ``2 ↑`` or ``run 2 backward``."""
+def _run(text: str) -> tuple[str, str, str] | None:
+    """Return run, direction and unit of a heading such as ``2 ↑ [µm]`` or ``run 2 backward``."""
     match = _RUN_HEADING.fullmatch(text)
-    direction = match[2].strip() if match else ""
-    return (match[1], direction) if match and direction.lower() in DIRECTIONS else None
+    if match is None or match[2].strip().lower() not in DIRECTIONS:
+        return None
+    return match[1], match[2].strip(), (match[3] or "").strip("[]() ")
 
 
 class CsvRows:
@@ -606,8 +607,8 @@ class CsvRows:
     def _runs_in_columns(self) -> dict[int, tuple[str, ...]]:
         """Return run and direction of each column of readings; such columns become rows."""
         pairs = {index: _run(heading) for index, heading in enumerate(self.header)}
-        runs: dict[int, tuple[str, ...]] = {index: run for index, run in pairs.items() if run}
-        units = {heading_unit(re.sub(r"\s*([\[(])", r"x\1", self.header[at])) for at in runs}
+        runs: dict[int, tuple[str, ...]] = {at: run[:2] for at, run in pairs.items() if run}
+        units = {run[2] for run in pairs.values() if run}
         if len(runs) < MIN_RUN_COLUMNS or len(units) > 1:
             return {}
         self._remarks.append(f"{len(runs)} runs in columns")
@@ -653,11 +654,11 @@ class CsvRows:
     def _readings_of_row(self, line: int, cells: Sequence[str]) -> Iterator[Row]:
         before: Sequence[str] = [cell for at, cell in enumerate(cells) if at not in self.runs]
         run = _run(before[0]) if self._has_run_rows else None
-        if self._has_run_rows and run is None:
+        if self._has_run_rows and (run is None or run[2]):
             self.note(f"line {line}: {spell_value(before[0])}; expected a run such as 2 ↑")
             return
         for index, condition in self.runs.items():
-            labels = [*condition, *run] if run else [*before, *condition]
+            labels = [*condition, *run[:2]] if run else [*before, *condition]
             if cells[index]:
                 yield line, [*labels, cells[index]]
 

@@ -451,7 +451,9 @@ def test_headings_with_blanks_and_in_german(text, position):
     ("text", "message"),
     [
         ("Target [mm];0;100\n1↑;0;1\nmean;0;1\n", 'line 3: "mean"; expected a run such as 2 ↑'),
+        ("Target [mm];0;100\n1↑ [mm];0;1\n", 'line 2: "1↑ .mm."; expected a run such as 2 ↑'),
         ("Target [mm];0;100\n1↑;0;1;2\n", "line 2: 4 fields; expected 3"),
+        ("Target [mm];1↑ [foo];1↓ [foo]\n0;0;1\n", "line 1: .*foo"),
     ],
 )
 def test_runs_in_rows_that_are_not_understood_are_refused(text, message):

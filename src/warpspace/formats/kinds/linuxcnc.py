@@ -62,22 +62,14 @@ def _is_comp(head: str, name: str) -> bool:
     if len(matches) < max(len(rows), 2):
         return False
     numbers = np.array([match.groups()[:3] for match in matches], float)
-    is_near = _follows(numbers) or _stays(numbers)
-    return is_near and bool(np.all(np.diff(numbers[:, 0]) > 0.0))
+    return any(_nearness(numbers)) and bool(np.all(np.diff(numbers[:, 0]) > 0.0))
 
 
-def _span(rows: np.ndarray) -> float:
-    return max(np.ptp(rows[:, 0]), abs(rows[:, 0]).max(), 1e-9)
-
-
-def _follows(rows: np.ndarray) -> bool:
-    """Return true for actual positions: near the nominal ones."""
-    return bool(np.abs(rows[:, 1:] - rows[:, :1]).max() < NEAR * _span(rows))
-
-
-def _stays(rows: np.ndarray) -> bool:
-    """Return true for corrections: near zero."""
-    return bool(np.abs(rows[:, 1:]).max() <= NEAR * _span(rows))
+def _nearness(rows: np.ndarray) -> tuple[bool, bool]:
+    """Return true for actual positions, near the nominal ones; and for corrections, near zero."""
+    limit = NEAR * max(np.ptp(rows[:, 0]), abs(rows[:, 0]).max(), 1e-9)
+    follows = np.abs(rows[:, 1:] - rows[:, :1]).max() < limit
+    return bool(follows), bool(np.abs(rows[:, 1:]).max() <= limit)
 
 
 _READ_SECTIONS = ("[TRAJ]", "[KINS]", "[END]")
@@ -125,11 +117,7 @@ def _rows(source: Source, per_unit: float, notes: list[str]) -> np.ndarray:
             if not rows:
                 problem = f"LinuxCNC stops here, at {at.quoted}, without a table"
                 at.refuse(problem, "three numbers: nominal forward reverse")
-            unread = [
-                source.at(n)
-                for n, text in enumerate(source.lines, 1)
-                if n >= number and text.strip()
-            ]
+            unread = [at for at, _ in source.scan() if at.line >= number]
             notes += [f"{note}: LinuxCNC stops at line {number}" for note in unread_notes(unread)]
             break
         if match[4].strip():
@@ -147,7 +135,7 @@ def _rows(source: Source, per_unit: float, notes: list[str]) -> np.ndarray:
 
 
 def _kind(source: Source, rows: np.ndarray, stated: str) -> tuple[str, tuple[str, ...]]:
-    follows, stays = _follows(rows), _stays(rows)
+    follows, stays = _nearness(rows)
     if (stated == OFFSETS and follows and not stays) or (
         stated == POSITIONS and stays and not follows
     ):
@@ -156,7 +144,7 @@ def _kind(source: Source, rows: np.ndarray, stated: str) -> tuple[str, tuple[str
         source.refuse(f"looks like {contents}, but is {stated}", f"{stated} (is it {other}?)")
     if stated:
         return stated, ()
-    kind = POSITIONS if follows and np.abs(rows[:, 1]).max() > NEAR * _span(rows) else OFFSETS
+    kind = POSITIONS if follows and not stays else OFFSETS
     description = "actual positions (type 0)" if kind == POSITIONS else "offsets (type 1)"
     return kind, (f"second and third column: {description}; --variant selects the other type",)
 
