@@ -169,9 +169,15 @@ def _units(where: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return ("mm" if is_linear(row.axis) else "deg",), ("urad" if row.is_rotation else "um",)
 
 
-def _column(rows: text_files.CsvRows, column: str, where: str) -> tuple[int, float, float]:
-    """Find a column by its heading, with or without its unit, and the factors of both columns."""
-    columns = rows.header[1:]
+def _column(rows: text_files.CsvRows, column: str, where: str) -> tuple[int, int, float, float]:
+    """Find the columns of positions and of values, with or without their unit, and their factors.
+
+    Positions are in the first column that is neither the run nor the direction.
+    """
+    first = next(
+        (n for n, name in enumerate(rows.header) if name.lower() not in (RUN, DIRECTION)), 0
+    )
+    columns = rows.header[first + 1 :]
     headings = columns
     if column not in columns:
         plain = [text_files.plain_heading(name) for name in columns]
@@ -179,8 +185,8 @@ def _column(rows: text_files.CsvRows, column: str, where: str) -> tuple[int, flo
     if headings.count(column) == 1:
         index = headings.index(column)
         position, error = _units(where)
-        scale = _factor(rows, rows.header[0], position)
-        return index + 1, scale, _factor(rows, columns[index], error)
+        scale = _factor(rows, rows.header[first], position)
+        return first, first + 1 + index, scale, _factor(rows, columns[index], error)
     problem = "occurs twice" if column in headings else "not found"
     hint = "" if column in headings else near_miss(column, columns)
     raise SceneError(rows.source, [f"column {column!r} {problem}{hint}"])
@@ -199,9 +205,9 @@ def _factor(rows: text_files.CsvRows, heading: str, targets: tuple[str, ...]) ->
 
 def _points(rows: text_files.CsvRows, column: str, where: str) -> list[tuple[float, float]]:
     points: list[tuple[float, float]] = []
-    index, scale, factor = _column(rows, column, where) if rows.header else (0, 1.0, 1.0)
+    first, index, scale, factor = _column(rows, column, where) if rows.header else (0, 0, 1.0, 1.0)
     for line, row in rows:
-        position = scale * rows.number(row[0], line, limit=limits.MAX_ERROR / scale)
+        position = scale * rows.number(row[first], line, limit=limits.MAX_ERROR / scale)
         value = factor * rows.number(row[index], line, limit=limits.MAX_ERROR / factor)
         if points and position <= points[-1][0]:
             problem = f"position {position:g} after {points[-1][0]:g}"
@@ -213,9 +219,10 @@ def _points(rows: text_files.CsvRows, column: str, where: str) -> list[tuple[flo
 
 
 def _runs(rows: text_files.CsvRows, column: str, where: str) -> tuple[TravelRun, ...]:
-    value_at, scale, factor = _column(rows, column, where)
+    position_at, value_at, scale, factor = _column(rows, column, where)
+    headings = [name.lower() for name in rows.header]
     run_at, direction_at = (
-        rows.header.index(name) if name in rows.header else None for name in (RUN, DIRECTION)
+        headings.index(name) if name in headings else None for name in (RUN, DIRECTION)
     )
     readings: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for line, row in rows:
@@ -224,7 +231,7 @@ def _runs(rows: text_files.CsvRows, column: str, where: str) -> tuple[TravelRun,
         if text and direction == UNKNOWN:
             spelling = text_files.spell_value(text)
             rows.note(f"line {line}: direction {spelling}; expected +, - or nothing")
-        position = scale * rows.number(row[0], line, limit=limits.MAX_LENGTH_MM / scale)
+        position = scale * rows.number(row[position_at], line, limit=limits.MAX_LENGTH_MM / scale)
         value = factor * rows.number(row[value_at], line, limit=limits.MAX_ERROR / factor)
         run = "" if run_at is None else text_files.unguard_cell(row[run_at])
         readings.setdefault((run, direction), []).append((position, value))

@@ -19,6 +19,7 @@ from warpspace.formats.to_scene import build_imported_scene
 from warpspace.kinematics.chain import loop_error, nominal_point
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorSet
+from warpspace.scene.curve_reader import read_csv_runs
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.text_files import match_column
 
@@ -415,6 +416,13 @@ def test_laser_sheets_are_read_alike_by_test_and_import(name, tmp_path):
     (exx,) = read_errors(open_files([path]), ReadOptions(axis="X")).imported.series
     assert exx.in_direction(FORWARD) == pytest.approx([0.35, 1.35, 2.45])
     assert exx.in_direction(BACKWARD) == pytest.approx([-2.25, -1.05, 0.15])
+    if name in ("headings in German", "point names"):  # a scene names its column
+        return
+    runs = read_csv_runs(path, "deviation", "measured.EXX")
+    points = {(run.direction, *point) for run in runs for point in run.points}
+    assert len(points) == len(ROWS)
+    assert sorted({place for _, place, _ in points}) == pytest.approx(TARGETS)
+    assert sorted(value for *_, value in points) == pytest.approx(sorted(row[3] for row in ROWS))
 
 
 @pytest.mark.parametrize(
