@@ -6,7 +6,8 @@ from timing import best
 
 from warpspace import load_scene
 from warpspace.analysis.description import ignore_progress
-from warpspace.parts.interpreter import ControlSettings, read_program
+from warpspace.parts.gcode.control_settings import ControlSettings
+from warpspace.parts.gcode.interpreter import read_program
 from warpspace.parts.program import Program, trace_program
 
 BLOCKS = 5600

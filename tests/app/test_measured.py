@@ -211,7 +211,10 @@ def test_a_page_gives_only_known_words_and_small_readable_files():
     column = calibrate()
     receive = column.give
     receive("../../<b>.csv", b"\xff\xfe")
-    assert "b.csv is not UTF-8" in column.html
+    assert "b.csv: is empty" in column.html
+    receive("utf16.csv", BUNDLED.decode().encode("utf-16"))
+    assert [file.name for file in column.part.files] == ["utf16.csv"]
+    column.do("remove", "0")
     receive("../../etc/passwd", b"x" * (2 * 2**20 + 1))
     assert "2.0 MB" in column.html
     assert "9.5 MB" in column.do("file", f"10000000\n{HOSTILE}\n")

@@ -64,6 +64,8 @@ def test_what_is_no_text_is_refused_unread_as_a_scene_and_as_its_csv(what, tmp_p
     )
     warpspace("check", tmp_path / "x.csv").refused(str(tmp_path / "x.csv"), said)
     if what != "5 MB":
+        if what == "latin":  # a table may be in Windows-1252
+            said = 'line 2: "ÿ"; expected a finite number'
         warpspace("check", scene).refused("errors.EBX", f"x.csv: {said}")
 
 

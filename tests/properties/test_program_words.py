@@ -9,14 +9,10 @@ from hypothesis import strategies as st
 
 import warpspace
 from warpspace.exceptions import SceneError
-from warpspace.parts.dialects import DIALECTS
-from warpspace.parts.interpreter import (
-    STAND,
-    ControlSettings,
-    Interpreter,
-    ParsedProgram,
-    read_program,
-)
+from warpspace.parts.gcode.control_settings import ControlSettings
+from warpspace.parts.gcode.dialects.detection import DIALECTS
+from warpspace.parts.gcode.interpreter import Interpreter, read_program
+from warpspace.parts.gcode.parsed import STAND, ParsedProgram
 
 SCENE = warpspace.load_scene("machine_gantry_mill")
 PROGRAM = """%

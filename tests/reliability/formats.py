@@ -124,11 +124,16 @@ Run Target Data:
 2 2 1.0
 2 1 0.0
 """
+READ_ONLY = {
+    "rtl": b"%% x.rtl\n" + RTL.encode(),
+    "reprapfirmware": b"%% config.g\nM556 S100 X0.7 Y-0.2 Z0.6\n",
+}
+"""Files of the formats that are not written."""
 
 
 def _import_seeds(name: str) -> list[bytes]:
     if not find_format(name).can_write:
-        return [b"%% x.rtl\n" + RTL.encode()]
+        return [READ_ONLY[name]]
     points = None if name in {"marlin", "klipper"} else 3
     found = compensate(load_scene("dvf5000_first"), Compensate(formats=(name,), points=points), 3)
     usual = found.format.endings[0]

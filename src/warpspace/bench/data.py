@@ -87,7 +87,7 @@ def parse_table(text: str, columns: Sequence[DataColumn], source: str) -> Readin
     rows = text_files.CsvRows(io.StringIO(text, newline=""), source, MAX_POINTS, unique=True)
     if not rows.header:
         raise SceneError(source, ["is empty; expected a header " + _header(columns)])
-    header = [text_files.plain_heading(name) for name in rows.header]
+    header = [text_files.plain_heading(text_files.translate_heading(name)) for name in rows.header]
     unit_note = _state_unit(header, columns) if rows.runs else ()
     matches = {column.name: text_files.match_column(column.name, header) for column in columns}
     _check_header(header, rows.line, columns, source, matches)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +34,8 @@ _PLY_BYTES = {
 }
 _GLB_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _GLB_COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-_DAE_REFERENCES = 20
-"""Nodes of a DAE file by reference: each may hold others, so that they multiply."""
+_REFERENCES = 20
+"""Nodes of a DAE or 3MF file by reference: each may hold others, so that they multiply."""
 NUMBERS_PER_TRIANGLE, WORDS_PER_TRIANGLE, BYTES_PER_TRIANGLE = 12, 40, 200
 """Limits per triangle of a file: numbers in lists or lines; words of a text, 21 in STL; bytes."""
 
@@ -219,8 +220,25 @@ def _placed(document: Any) -> Iterator[int]:
 
 def _count_dae(data: bytes, max_triangles: int) -> None:
     _check_count(data.count(b"<"), 2 * limits.MAX_MESH_PARTS, "XML tags")
-    _check_count(data.count(b"<instance_node"), _DAE_REFERENCES, "nodes by reference")
+    _check_count(data.count(b"<instance_node"), _REFERENCES, "nodes by reference")
     _count_text(data, max_triangles)
+
+
+def _count_3mf(data: bytes, max_triangles: int) -> None:
+    with ZipFile(io.BytesIO(data)) as archive:
+        size = sum(entry.file_size for entry in archive.infolist())
+        _check_count(size, BYTES_PER_TRIANGLE * max_triangles, "bytes unpacked")
+        models = [archive.read(name) for name in archive.namelist() if name.endswith(".model")]
+    for tag, limit in ("triangle ", max_triangles), ("component ", _REFERENCES):
+        _check_count(sum(model.count(b"<" + tag.encode()) for model in models), limit, f"{tag}tags")
+
+
+def _check_step(data: bytes, _max_triangles: int) -> None:
+    if not data.lstrip().startswith(b"ISO-10303-21;"):
+        raise ValueError("line 1: expected ISO-10303-21;")
+    if not data.rstrip(b"\0 \r\n").endswith(b"END-ISO-10303-21;"):
+        line = data.count(b"\n") + 1
+        raise ValueError(f"line {line}: the file is cut off; expected END-ISO-10303-21;")
 
 
 _COUNTERS: dict[str, Callable[[bytes, int], object]] = {
@@ -229,6 +247,9 @@ _COUNTERS: dict[str, Callable[[bytes, int], object]] = {
     ".ply": _count_ply,
     ".glb": _count_glb,
     ".dae": _count_dae,
+    ".3mf": _count_3mf,
+    ".step": _check_step,
+    ".stp": _check_step,
 }
 
 
@@ -313,6 +334,10 @@ def open_meshes(
             return scene
     except OptionError as error:
         raise OptionError(f"{path}: {error}. Reduce it before") from None
+    except ImportError as error:
+        extra = "step" if error.name == "cascadio" else "3mf"
+        install = f"pip install 'warpspace[{extra}]'"
+        raise OptionError(f"{path}: a {what} needs {error.name}: {install}") from None
     except Exception as error:  # noqa: BLE001  # trimesh raises any error for a damaged file
         reason = str(error) or type(error).__name__
         raise OptionError(f"{path}: no {what} that can be read ({reason})") from None

@@ -19,6 +19,16 @@ UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 """Units of length of meshes, mm."""
 FORMATS = {".stl": ("mm", "z"), ".obj": ("mm", "z"), ".ply": ("mm", "z"), ".glb": ("m", "y")}
 """Endings with their default unit and upward axis."""
+IMPORTED = FORMATS | {".3mf": ("mm", "z"), ".step": ("m", "z"), ".stp": ("m", "z")}
+"""Endings that are read; files that are not written state their unit."""
+UNITS_3MF_MM = {
+    "micron": 1e-3,
+    "millimeter": 1.0,
+    "centimeter": 10.0,
+    "meter": 1000.0,
+    "inch": 25.4,
+    "foot": 304.8,
+}
 SMALL_MM, LARGE_MM = 10.0, 100_000.0
 """Longest edges beyond suggest another unit."""
 MAX_SHELL_PAIRS = 20_000_000  # of a shell and a cavity that are examined
@@ -43,14 +53,23 @@ def read_mesh(
     """
     from trimesh import graph, grouping
 
-    if path.suffix.lower() not in FORMATS:
-        raise OptionError(f"{path}: unknown ending; expected one of {', '.join(FORMATS)}")
-    has_unit, (standard, up) = unit is not None, FORMATS[path.suffix.lower()]
+    ending = path.suffix.lower()
+    if ending not in IMPORTED:
+        raise OptionError(f"{path}: unknown ending; expected one of {', '.join(IMPORTED)}")
+    if unit and ending not in FORMATS:
+        raise OptionError(f"{path}: unit {unit!r}; expected none, the file states it")
+    has_unit, (standard, up) = unit is not None or ending not in FORMATS, IMPORTED[ending]
     unit = unit or standard
     if unit not in UNITS_MM:
         raise OptionError(f"{path}: {unit!r}; expected one of {', '.join(UNITS_MM)}")
     scene = open_meshes(path, f"{path.suffix[1:].upper()} file", max_triangles, data)
     nodes, notes = scene.graph.nodes_geometry, scene.metadata["notes"]
+    mm_per_unit = UNITS_MM[unit]
+    if ending == ".3mf":
+        name = str(scene.metadata["units"]).removesuffix("s")
+        if name not in UNITS_3MF_MM:
+            raise OptionError(f"{path}: unit {name!r}; expected one of {', '.join(UNITS_3MF_MM)}")
+        mm_per_unit = UNITS_3MF_MM[name]
     pose, name = scene.graph[nodes[0]] if len(nodes) == 1 else (None, None)
     is_one = hasattr(scene.geometry.get(name), "faces")  # a large one is not copied
     mesh = scene.geometry[name].apply_transform(pose) if is_one else scene.to_mesh()
@@ -62,7 +81,7 @@ def read_mesh(
     mesh.update_faces((mesh.faces != np.roll(mesh.faces, 1, axis=1)).all(axis=1))
     if not len(mesh.faces):
         raise OptionError(f"{path}: there are no triangles in it")
-    mesh.apply_scale(UNITS_MM[unit])
+    mesh.apply_scale(mm_per_unit)
     if up == "y":
         mesh.apply_transform([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
     longest = float(np.ptp(mesh.vertices, axis=0).max())
@@ -179,6 +198,8 @@ def frame_meshes(
                     " triangles, the most expected"
                 )
             parts.setdefault(frame, []).append(mesh)
+    for mesh in meshes.values():
+        notes += [] if isinstance(mesh, str) else mesh.metadata["notes"]
     return {frame: util.concatenate(own) for frame, own in parts.items()}, notes, list(meshes)
 
 
@@ -235,7 +256,9 @@ def _mesh(geometry: Any, folders: tuple[Path, Path], meshes: dict[Path, Any]) ->
         )
     if path not in meshes:
         try:
-            loaded = open_meshes(path, "mesh").to_mesh()
+            scene = open_meshes(path, "mesh")
+            loaded = scene.to_mesh()
+            loaded.metadata["notes"] = scene.metadata["notes"]
             meshes[path] = loaded if len(loaded.faces) else "it is empty"
         except OptionError as error:
             meshes[path] = str(error)

@@ -374,7 +374,13 @@ class Positions(MeasurementKind):
         return set(READ) <= set(table.columns) and not axes & set(READ)
 
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
-        observed = table.require(READ)
+        joints = [axis_column(scene, name) for name in scene.machine.columns]
+        if joints and {*joints} <= {*table.columns} and not {*READ} & {*table.columns}:
+            raise table.refuse(
+                "has axis positions only; expected measured positions x_mm, y_mm, z_mm (a closed"
+                " loop, where the tool stays at one point, is not supported)"
+            )
+        observed = table.require((*READ, *joints))[:, : len(READ)]
         coordinates, notes = axis_columns(table, scene)
         readings = build_readings(self.name, scene, table, coordinates, observed, notes)
         readings = replace(readings, first_fit=_first_fit(scene, readings))

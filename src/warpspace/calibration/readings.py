@@ -72,10 +72,10 @@ class ReadingTable:
         missing = [name for name, column in arrays.items() if column is None]
         if missing:
             present = ", ".join((*self.labels, *self.columns)) or "none"
-            problem = f"has no column {', '.join(missing)}{near_miss(missing[0], self.columns)}"
-            raise self.refuse(
-                f"{problem}; expected {', '.join(names)} (columns in the file: {present})"
-            )
+            hint = near_miss(missing[0], self.columns)
+            hint = hint if "did you mean" in hint else ""
+            expected = f"expected {', '.join(names)} (columns in the file: {present})"
+            raise self.refuse(f"has no column {', '.join(missing)}{hint}; {expected}")
         return np.column_stack([column for column in arrays.values() if column is not None])
 
     @property

@@ -224,17 +224,21 @@ def _refuse_unpublished(name: str, content: bytes = b"", head: str = "") -> None
         starts = tuple(start.encode("latin-1") for start in kind.get("starts", ()))
         pattern = kind.get("pattern", "")
         if content.startswith(starts) or (pattern and re.search(pattern, head, re.MULTILINE)):
-            problem = f"is {kind['what']}; expected another file: {kind['instead']}"
-            raise SceneError(name, [problem])
+            raise SceneError(name, [f"is {kind['what']}; {_alternative(kind)}"])
+
+
+def _alternative(kind: Mapping[str, str]) -> str:
+    template = "enter position and error in the table of `warpspace import --template AXIS`"
+    return f"expected another file: {kind.get('instead', template)}"
 
 
 def _refuse_ending(name: str) -> None:
     """Raise an error for a file that no format reads, by its ending."""
     for kind in _catalogue()["unpublished"]:
-        ending = next((end for end in kind["endings"] if name.lower().endswith(end)), "")
+        ending = next((end for end in kind.get("endings", ()) if name.lower().endswith(end)), "")
         if ending:
             problem = f"matches no known format; {ending} may be {kind['what']}"
-            raise SceneError(name, [f"{problem}; expected another file: {kind['instead']}"])
+            raise SceneError(name, [f"{problem}; {_alternative(kind)}"])
 
 
 def open_upload(name: str, content: bytes) -> Source:

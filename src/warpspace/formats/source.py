@@ -3,7 +3,7 @@
 import io
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NoReturn
 
@@ -12,30 +12,16 @@ from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM
 from warpspace.scene.text_files import (
     ANGLE_URAD,
     LENGTH_UM,
+    UNIT_SPELLING,
     CsvRows,
     decode_text,
     one_line,
     parse_number,
 )
 
-UM_PER: Mapping[str, float] = {**LENGTH_UM, **dict.fromkeys(("µm", "μm"), 1.0)}
-"""Micrometres per unit of length."""
-URAD_PER: Mapping[str, float] = {
-    **ANGLE_URAD,
-    **dict.fromkeys(("µrad", "μrad", "um/m", "µm/m"), 1.0),
-    "mm/m": 1e3,
-    "°": ANGLE_URAD["deg"],
-    **dict.fromkeys(('"', "″"), ANGLE_URAD["arcsec"]),
-}
-"""Microradians per unit of angle."""
-MM_PER: Mapping[str, float] = {unit: size * 1e-3 for unit, size in UM_PER.items()}
-DEG_PER: Mapping[str, float] = {
-    "deg": 1.0,
-    "°": 1.0,
-    "rad": 180.0 / math.pi,
-    "arcsec": 1.0 / 3600.0,
-}
-DEG_TO_URAD = URAD_PER["deg"]
+MM_PER: Mapping[str, float] = {unit: size * 1e-3 for unit, size in LENGTH_UM.items()}
+DEG_PER: Mapping[str, float] = {"deg": 1.0, "rad": 180.0 / math.pi, "arcsec": 1.0 / 3600.0}
+DEG_TO_URAD = ANGLE_URAD["deg"]
 
 
 def format_number(value: float, digits: int) -> str:
@@ -164,19 +150,28 @@ class SourceLine:
         return value
 
     def unit(self, unit: str, factors: Mapping[str, float], quantity: str) -> float:
-        if unit not in factors:
-            units = unit_list(factors)
-            self.refuse(f"{quantity} in {quote(unit)}", f"one of the units {units}")
-        return factors[unit]
+        bare = unit.translate(UNIT_SPELLING)
+        if bare not in factors:
+            expected = f"one of the units {', '.join(factors)}"
+            self.refuse(f"{quantity} in {quote(unit)}", expected)
+        return factors[bare]
 
     def ascending(self, value: float, before: float, quantity: str, of: str = "") -> None:
         if value <= before:
             self.refuse(f"{quantity} {value:g}{of} after {before:g}", "ascending positions")
 
 
-def unit_list(factors: Mapping[str, float]) -> str:
-    """List the units that are words in ASCII, for a message."""
-    return ", ".join(name for name in factors if name.isascii() and name[0].isalpha())
+MAX_LISTED = 6  # lines that are not read, in a note
+
+
+def unread_notes(lines: Sequence[SourceLine]) -> tuple[str, ...]:
+    """Return a note on the lines of a file that contain no error; none without such lines."""
+    if not lines:
+        return ()
+    listed = ", ".join(f"line {at.line} {at.quoted}" for at in lines[:MAX_LISTED])
+    count = len(lines) - MAX_LISTED
+    remainder = f" and {count:,} more" if count > 0 else ""
+    return (f"{lines[0].source.base}: ignored {listed}{remainder}",)
 
 
 def quote(text: str) -> str:

@@ -4,14 +4,17 @@ A shape is a surface of revolution about an axis: a point at the height h along 
 ρ from it has the distance (ρ − radius) · cos φ − h · sin φ to the surface. φ is 0 for a
 cylinder and the half angle of a cone; −90° makes it a plane whose axis is its normal; without an
 axis it is a sphere. Shapes are fitted to vertices by least squares of these distances, weighted by
-the area of their triangles, and follow their small displacements in first order. A measure is
+the area of their triangles, and follow their small displacements in first order, by least squares
+or, where a feature states it, as minimum zone, maximum inscribed or minimum circumscribed shape.
+Surfaces of scans are fitted likewise, without outliers; their residuals stay in form errors.
+A measure is
 evaluated on the workpiece as clamped, and `placed`, after the best rigid fit of its surface. The
 contribution of a parameter is evaluated where all errors are half as large, so that contributions
 add up.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple, TypeAlias
 
@@ -26,7 +29,7 @@ from warpspace.analysis.uncertainty.propagation import (
     plus_minus,
 )
 from warpspace.analysis.uncertainty.verdict import Verdict
-from warpspace.exceptions import SceneError, near_miss
+from warpspace.exceptions import OptionError, SceneError, near_miss
 from warpspace.kinematics.model import Loop
 from warpspace.kinematics.transforms import skew, vector_rotation
 from warpspace.parts.workpiece import (
@@ -52,6 +55,12 @@ SLIVER_SHARE = 0.01  # share of the area whose normals may deviate
 AXIS_MM = 1e-3  # distance from an axis below which a point, as the tip of a cone, has no side
 RANK_TOLERANCE = 3e-7  # share of the strongest response below which a freedom is undetermined
 STEPS, STILL_MM, FAR_MM = 40, 1e-11, 1e6  # of a fit; changes of a distance that end it
+SCAN_NOISE_UM = 20.0  # largest standard deviation of vertices of a scan
+OUTLIER = 4.0  # standard deviations beyond which a vertex of a scan is an outlier
+ROBUST_STEPS, MEDIAN_TO_SIGMA = 5, 1.4826  # of a normal distribution
+OUTLIER_SHARE, SCAN_DEG = 0.01, 30.0  # outliers; angle between triangles and the first guess
+SCAN_VERTICES = 24  # of a surface, at least: fewer lie near many shapes
+SIMPLER = 1.1  # ratio of residuals up to which the simpler shape is chosen
 MAX_FEATURES = 500  # the largest surfaces of a mesh; smaller ones are ignored
 RIGHT_RAD = 1e-4  # tolerance of nominal angles of 90° or 0, and of what datums fix
 STEP_SHARE = 1e-4  # step of difference quotients, as a share of an error
@@ -74,6 +83,12 @@ class FeatureShape:
         """Projection on the directions in which its position is determined, [3, 3]."""
         along = np.outer(self.axis, self.axis)
         return along if self.kind == "plane" else np.eye(3) - along
+
+    def move(self, step: Array) -> "FeatureShape":
+        """Return the shape after a step, [8], of the columns of its design matrix."""
+        centre, axis = self.centre_mm + step[:3], vector_rotation(step[3:6]) @ self.axis
+        radius, angle = self.radius_mm + step[6], self.angle_rad + step[7]
+        return FeatureShape(self.kind, centre, axis, radius, angle)
 
     def respond(self, point_mm: Array) -> tuple[Array, Array, Array]:
         """Compute distances of points, [n], outwards, and their derivatives.
@@ -115,6 +130,24 @@ class Feature:
     area_mm2: float
     normal: Array  # [n, 3]; see `FeatureShape.respond`
     design: Array  # [n, 8]
+    residual_mm: Array  # [m], of its first vertices, those of a scan; zero of a nominal mesh
+    fit: str = schema.LEAST_SQUARES
+
+    @property
+    def residual_um(self) -> float:
+        """Standard deviation of the vertices of a scan from the shape."""
+        return float(np.std(self.residual_mm)) * UM_PER_MM
+
+    def with_fit(self, fit: str) -> "Feature":
+        """Return the feature with its shape fitted otherwise to its vertices."""
+        if fit == schema.LEAST_SQUARES:
+            return self
+        design = self.design[: len(self.residual_mm)]
+        step = fit_extreme(design, self.residual_mm, fit)
+        if not self.residual_mm.any():
+            step[:] = 0.0
+        residual = self.residual_mm + design @ step
+        return replace(self, shape=self.shape.move(step), residual_mm=residual, fit=fit)
 
     def follow(self, move_um: Array) -> ShapeMotion:
         """Fit the motion of the shape to displacements of all vertices of the mesh, [F, V, 3]."""
@@ -122,8 +155,12 @@ class Feature:
         mean = self.shares @ move  # directions without influence on distances follow it
         away = np.einsum("fnc,nc->fn", move - mean[:, None], self.normal)
         step = -np.linalg.lstsq(self.design * root, away.T * root, RANK_TOLERANCE)[0].T
+        count = len(self.residual_mm)
+        away, design = away[:, :count] + self.residual_mm, self.design[:count]
+        if self.fit != schema.LEAST_SQUARES:
+            step = np.array([fit_extreme(design, distance, self.fit) for distance in away])
         radius, angle = self.shape.radius_mm + step[:, 6], self.shape.angle_rad + step[:, 7]
-        form = np.ptp(away + step @ self.design.T, axis=1)
+        form = np.ptp(away + step @ design.T, axis=1)
         return ShapeMotion(self.shape, mean + step[:, :3], step[:, 3:6], radius, angle, form)
 
 
@@ -132,21 +169,50 @@ def fit_shape(start: FeatureShape, point_mm: Array, shares: Array | None = None)
     shape, root = start, np.sqrt(np.ones(len(point_mm)) if shares is None else shares)
     for _ in range(STEPS):
         distance, _, design = shape.respond(point_mm)
-        step = -np.linalg.lstsq(design * root[:, None], distance * root, RANK_TOLERANCE)[0]
-        centre, axis = shape.centre_mm + step[:3], vector_rotation(step[3:6]) @ shape.axis
-        radius, angle = shape.radius_mm + step[6], shape.angle_rad + step[7]
-        shape = FeatureShape(shape.kind, centre, axis, radius, angle)
+        step: Any = -np.linalg.lstsq(design * root[:, None], distance * root, RANK_TOLERANCE)[0]
+        shape = shape.move(step)
         if not STILL_MM < np.abs(design @ step).max() < FAR_MM:
             break
     return shape
 
 
-def find_features(fine: Workpiece) -> dict[str, Feature]:
+def fit_extreme(design: Array, distance_mm: Array, fit: str) -> Array:
+    """Fit a minimum zone, a maximum inscribed or a minimum circumscribed shape to distances, [n].
+
+    Returns
+    -------
+    ndarray, [8]
+        Step of the shape, of the columns of `design`. To first order it is the linear programme of
+        Chebyshev: the least t of |distance + design · step| ≤ t, or the extreme radius of which all
+        distances are on one side.
+    """
+    from scipy.optimize import linprog
+
+    _, size, axes = np.linalg.svd(design, full_matrices=False)
+    is_free = size > RANK_TOLERANCE * size[0]
+    basis = axes[is_free].T * (np.sqrt(len(design)) / size[is_free])
+    rows, limit = design @ basis, -distance_mm * UM_PER_MM
+    signs = {"inscribed": (-1.0,), "circumscribed": (1.0,)}.get(fit, (1.0, -1.0))
+    zone = np.full((len(rows), 1), -1.0 if len(signs) == 2 else 0.0)
+    goal = np.append(basis[6] * signs[0] * (len(signs) == 1), -zone[0])
+    solution = linprog(
+        goal,
+        np.vstack([np.hstack([sign * rows, zone]) for sign in signs]),
+        np.concatenate([sign * limit for sign in signs]),
+        bounds=[(None, None)] * is_free.sum() + [(0.0, None)],
+    )
+    if solution.x is None:
+        raise OptionError(f"points on one side do not determine its {fit} fit")
+    return basis @ solution.x[:-1] * MM_PER_UM
+
+
+def find_features(fine: Workpiece, noise_um: float = SCAN_NOISE_UM) -> dict[str, Feature]:
     """Find the shapes that the surface of a part consists of, sorted by kind, size and place.
 
     Those of the original mesh, with the vertices of the refined one. Surfaces between creases are
-    examined first, then the remaining ones, divided by the size of their facets. A surface that
-    deviates from all shapes by more than `SHAPE_SHARE` of its extent is no feature.
+    examined first, then the remaining ones, divided by the size of their facets, finally those of
+    scans. A surface that deviates from all shapes by more than `SHAPE_SHARE` of its extent, and of
+    a scan by a standard deviation of more than `noise_um`, is no feature.
     """
     from trimesh.graph import connected_component_labels, connected_components
 
@@ -158,17 +224,25 @@ def find_features(fine: Workpiece) -> dict[str, Feature]:
     facet = np.bincount(facet_of, area)[facet_of][pairs]
     is_alike = facet.max(axis=1) < FACET_RATIO * facet.min(axis=1)
     is_free, features = np.ones(len(area), dtype=bool), list[Feature]()
-    for chosen in (True, is_alike):
+    for chosen, noise in ((True, 0.0), (is_alike, 0.0), (True, noise_um)):
         links = pairs[chosen & is_free[pairs].all(axis=1)]
         # a single triangle is flat whatever the machine does
         surfaces: Any = connected_components(links, min_len=2, engine="scipy")
         for rows in sorted(surfaces, key=lambda rows: -area[rows].sum())[:MAX_FEATURES]:
             kinds = SHAPES if len(np.unique(facet_of[rows])) >= FACETS else SHAPES[:1]
-            fits = (_fit_feature(fine, mesh, kind, rows) for kind in kinds)
+            fits = (_fit_feature(fine, mesh, kind, rows, noise) for kind in kinds)
+            if noise:
+                fits = [*filter(None, fits)]
+                limit = SIMPLER * min((fit.residual_um for fit in fits), default=0.0)
+                fits = (fit for fit in fits if fit.residual_um <= limit)
             feature = next(filter(None, fits), None)
             if feature is not None:
                 is_free[rows] = False
                 features.append(feature)
+    if any(feature.residual_um for feature in features):
+        # a few triangles of a scan may lie on a plane by chance
+        least = SLIVER_SHARE * area.sum()
+        features = [x for x in features if x.area_mm2 > least or len(x.vertices) >= SCAN_VERTICES]
     features.sort(key=lambda x: (float(f"{-x.area_mm2:.5g}"), *x.shape.centre_mm.round(3)))
     names: dict[str, Feature] = {}
     for kind in SHAPES:
@@ -178,9 +252,12 @@ def find_features(fine: Workpiece) -> dict[str, Feature]:
 
 
 def _fit_feature(
-    fine: Workpiece, mesh: Workpiece, kind: str, rows: NDArray[np.intp]
+    fine: Workpiece, mesh: Workpiece, kind: str, rows: NDArray[np.intp], noise_um: float
 ) -> Feature | None:
-    """Fit a shape to triangles; None where their normals or vertices deviate from it."""
+    """Fit a shape to triangles; None where their normals or vertices deviate from it.
+
+    With `noise_um`, vertices may have a standard deviation up to that, and a few be outliers.
+    """
     normal, area = mesh.surface.face_normals[rows], mesh.surface.area_faces[rows]
     place, weight = mesh.surface.triangles_center[rows], area / area.sum()
     centre, mean = weight @ place, weight @ normal
@@ -197,23 +274,42 @@ def _fit_feature(
     centre = centre - reach * (mean - (mean @ axis) * axis)
     start = FeatureShape(kind, centre, axis, abs(reach) * np.cos(angle), angle)
     turned = np.sum(start.respond(place)[1] * normal, axis=1)
-    is_turned = turned * np.sign(area @ turned) < np.cos(np.deg2rad(NEAR_DEG))
+    near_deg = SCAN_DEG if noise_um else NEAR_DEG
+    is_turned = turned * np.sign(area @ turned) < np.cos(np.deg2rad(near_deg))
     if area @ is_turned > SLIVER_SHARE * area.sum():
         return None
     vertices, shares = _weigh_vertices(mesh, rows)
+    if noise_um and len(vertices) < SCAN_VERTICES:
+        return None
     points = mesh.vertices_mm[vertices]
     shape = fit_shape(start, points, shares)
     distance, *_ = shape.respond(points)
     tolerance = SHAPE_SHARE * np.linalg.norm(np.ptp(points, axis=0))
     tolerance += ROUNDING_SHARE * np.abs(mesh.vertices_mm).max()
-    if np.abs(distance).max() > tolerance:
+    is_inlier = np.abs(distance) <= tolerance
+    for _ in range(ROBUST_STEPS * bool(noise_um)):
+        deviation = np.median(np.abs(distance)) * MEDIAN_TO_SIGMA
+        is_inlier = np.abs(distance) <= max(OUTLIER * deviation, tolerance)
+        shape = fit_shape(shape, points[is_inlier], shares[is_inlier])
+        distance, *_ = shape.respond(points)
+    residual = distance[is_inlier]
+    if noise_um:
+        deviation = np.sqrt(np.mean(residual**2)) * UM_PER_MM
+        uncertain = 1.0 + 2.0 / np.sqrt(len(residual))  # of a sample, 95 %
+        if deviation > noise_um * uncertain or np.mean(is_inlier) < 1.0 - OUTLIER_SHARE:
+            return None
+    elif not is_inlier.all():
         return None
     if fine.source is not None:
         is_part = np.zeros(len(mesh.triangles), dtype=bool)
         is_part[rows] = True
+        outliers = vertices[~is_inlier]
         vertices, shares = _weigh_vertices(fine, np.flatnonzero(is_part[fine.source]))
-    _, *response = shape.respond(fine.vertices_mm[vertices])
-    return Feature(shape, vertices, shares, float(area.sum()), *response)
+        is_inlier = ~np.isin(vertices, outliers)
+    vertices, shares = vertices[is_inlier], shares[is_inlier] / shares[is_inlier].sum()
+    residual = residual if noise_um else np.zeros(len(vertices))
+    _, outward, design = shape.respond(fine.vertices_mm[vertices])
+    return Feature(shape, vertices, shares, float(area.sum()), outward, design, residual)
 
 
 def _weigh_vertices(mesh: Workpiece, rows: NDArray[np.intp]) -> tuple[NDArray[np.int32], Array]:
@@ -302,6 +398,8 @@ class FeatureResult:
     measures: Mapping[str, Mapping[str, Any]]  # by name: numbers by names with units, and a budget
     budget_of: str  # measure of `budget`: one with a tolerance in µm, or the position
     budget: Mapping[str, float]  # contribution of each parameter, placed, µm
+    fit: str
+    residual_um: float  # standard deviation of vertices of a scan; 0 of a nominal mesh
 
 
 def inspect(
@@ -311,6 +409,7 @@ def inspect(
     tolerances: tuple[str, str] | None = None,
     uncertainty: FieldUncertainty | None = None,
     interpolation_um: float = 0.0,
+    noise_um: float = SCAN_NOISE_UM,
 ) -> tuple[FeatureResult, ...]:
     """Measure the features of a workpiece, in the frame of its mesh.
 
@@ -318,17 +417,16 @@ def inspect(
     largest deviation of errors between evaluated points. `tolerances` are the name and the text of
     a TOML file of features; a SceneError lists its problems.
     """
-    by_name, points = find_features(mesh), mesh.vertices_mm
-    names, features = [*by_name], by_name.values()
-    shapes = [feature.shape for feature in features]
+    by_name, points = find_features(mesh, noise_um), mesh.vertices_mm
+    names, features = [*by_name], [*by_name.values()]
     bands: MeasureBands = {
         (kind, (at,)): None
-        for at, shape in enumerate(shapes)
+        for at, feature in enumerate(features)
         for kind, row in KINDS.items()
-        if shape.kind in row.features and not row.datum_count[0]
+        if feature.shape.kind in row.features and not row.datum_count[0]
     }
     if tolerances:
-        bands |= _read_tolerances(*tolerances, shapes, names)
+        bands |= _read_tolerances(*tolerances, features, names)
     if not bands:
         return ()
     turn, evaluate_measures = _rotation(mesh, actual), partial(_evaluate_measures, features, bands)
@@ -363,9 +461,12 @@ def inspect(
             KINDS[kind], values[:, index], band, split, stated, interpolation_um
         )
     results: list[FeatureResult] = []
-    for name, shape, row in zip(names, shapes, measures, strict=True):
+    for name, feature, row in zip(names, features, measures, strict=True):
         of = next((key for key, numbers in row.items() if "tolerance_um" in numbers), "position")
-        results.append(FeatureResult(name, shape.kind, row, of, row[of]["budget"]))
+        result = FeatureResult(
+            name, feature.shape.kind, row, of, row[of]["budget"], feature.fit, feature.residual_um
+        )
+        results.append(result)
     return tuple(results)
 
 
@@ -376,14 +477,14 @@ def measure_changes(
 
     In µm or µrad; displacements of vertices are in the workpiece frame.
     """
-    features = find_features(mesh)
-    shapes = [feature.shape for feature in features.values()]
-    bands = _read_tolerances(*tolerances, shapes, [*features])
+    by_name = find_features(mesh)
+    features = [*by_name.values()]
+    bands = _read_tolerances(*tolerances, features, [*by_name])
     toleranced = [measure for measure, band in bands.items() if band]
     moved = np.array([actual.error_um, *moves_um]) @ _rotation(mesh, actual)
     present, *steps = subtract_best_fit(mesh.vertices_mm, moved, mesh.shares)
     moves = (present + sign * STEP_SHARE * np.array(steps) for sign in (-1.0, 1.0))
-    low, high = (_evaluate_measures(features.values(), toleranced, move) for move in moves)
+    low, high = (_evaluate_measures(features, toleranced, move) for move in moves)
     return (high - low) / (2.0 * STEP_SHARE)
 
 
@@ -446,18 +547,20 @@ def _measure_numbers(
 
 
 def _read_tolerances(
-    source: str, text: str, shapes: Sequence[FeatureShape], names: list[str]
+    source: str, text: str, features: list[Feature], names: list[str]
 ) -> MeasureBands:
+    """Read measures with their tolerances; assign their names and fits to features."""
     problems, raw = schema.Problems(), parse_toml(text, source)
     entries: Sequence[Any] = (problems.read(schema.FEATURES, "", raw) or {}).get("features", ())
     index_of, bands = {name: at for at, name in enumerate(names)}, MeasureBands()
+    fitted = set[int]()
     for index, entry in enumerate(entries):
         where, chosen = f"features[{index}]", [entry["is"], *entry["to"]]
         if entry["near"] is not None:
             away = {
-                float(np.linalg.norm(shape.centre_mm - entry["near"])): name
-                for name, shape in zip(names, shapes, strict=True)
-                if shape.kind == entry["is"]
+                float(np.linalg.norm(feature.shape.centre_mm - entry["near"])): name
+                for name, feature in zip(names, features, strict=True)
+                if feature.shape.kind == entry["is"]
             }
             chosen[0] = away.get(min(away, default=0.0), entry["is"])
         problems.only(where, chosen, index_of, "feature")
@@ -468,7 +571,15 @@ def _read_tolerances(
         if index_of.setdefault(name, of[0]) != of[0]:
             problems.add(f"{where}.name", "another feature has it", name)
         twice = "an entry before has the same measure" * ((entry["measure"], of) in bands)
-        problem = twice or _find_problem(entry, [shapes[at] for at in of])
+        problem = twice or _find_problem(entry, [features[at].shape for at in of])
+        if entry["fit"] and not problem:
+            feature = features[of[0]]
+            problem = _find_fit_problem(feature, entry["fit"], of[0] in fitted)
+            fitted.add(of[0])
+            try:
+                features[of[0]] = feature if problem else feature.with_fit(entry["fit"])
+            except OptionError as error:
+                problem = str(error)
         if problem:
             problems.add(where, problem)
         elif entry["measure"]:
@@ -498,6 +609,15 @@ def _find_problem(entry: Mapping[str, Any], shapes: Sequence[FeatureShape]) -> s
         (angle,) = _angle(*(ShapeMotion(shape, *np.zeros((5, 1, 3))) for shape in shapes))
         if abs((np.cos if name == "squareness" else np.sin)(angle)) > RIGHT_RAD:
             return f"{name} at a nominal angle of {np.rad2deg(angle):.4g}°; expected angle"
+    return ""
+
+
+def _find_fit_problem(feature: Feature, fit: str, is_fitted: bool) -> str:
+    if is_fitted and fit != feature.fit:
+        return f"fit {fit!r}; an entry before states {feature.fit!r} for the same feature"
+    kinds = KINDS["diameter"].features
+    if fit in schema.EXTREME_FITS and feature.shape.kind not in kinds:
+        return f"{fit} fit of a {feature.shape.kind}; expected a {' or a '.join(kinds)}"
     return ""
 
 

@@ -22,7 +22,7 @@ from warpspace.field.evaluate import ErrorField
 from warpspace.kinematics import transforms
 from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_SCENE_BYTES
-from warpspace.parts.inspection import FeatureResult, features_table, inspect
+from warpspace.parts.inspection import SCAN_NOISE_UM, FeatureResult, features_table, inspect
 from warpspace.parts.refinement import refine
 from warpspace.parts.workpiece import (
     TRIANGLES_AT_ONCE,
@@ -39,6 +39,7 @@ from warpspace.scene.text_files import read_text
 from warpspace.units import MM_PER_UM, Array
 
 REPORTED_UM = 0.5  # interpolation errors that are reported
+MAX_NOISE_UM = 1000.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +72,12 @@ class Part(WorkpieceAnalysis):
     predistorted: bool = option(
         False, "Write with -o the predistorted part, from which the nominal one is cut"
     )
+    noise: float = option(
+        SCAN_NOISE_UM,
+        "Largest standard deviation of vertices of a scan from its features, µm; 0 for none",
+        low=0.0,
+        high=MAX_NOISE_UM,
+    )
     tolerances: tuple[str, str] | None = None  # name and text, instead of `features`
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "PartResult":
@@ -95,7 +102,9 @@ class Part(WorkpieceAnalysis):
         as_cut, placed = _deviations(surface, fine.shares, actual, states)
         features_of: Sequence[FeatureResult] = ()
         if not is_large:
-            features_of = inspect(scene, fine, actual, tolerances, uncertainty, interpolation)
+            features_of = inspect(
+                scene, fine, actual, tolerances, uncertainty, interpolation, self.noise
+            )
         return PartResult(
             vertices=vertices,
             outside=int(actual.outside[:vertices].sum()),
@@ -104,7 +113,7 @@ class Part(WorkpieceAnalysis):
             features=features_of,
             uncertainty=uncertainty and uncertainty.errors,
             interpolation_um=interpolation,
-            workpiece=place_workpiece(mesh, scene, self.place),
+            workpiece=surface if fine is mesh else place_workpiece(mesh, scene, self.place),
             actual=actual,
             scene=scene,
             analysis=self,
@@ -181,6 +190,12 @@ class PartResult(PartDeviation, Result):
         if self.interpolation_um:
             excess = f"up to {self.interpolation_um:.1f} µm"
             yield f"errors between evaluated points deviate by {excess} more; expected a finer mesh"
+        scans = [feature.residual_um for feature in self.features if feature.residual_um]
+        if scans:
+            yield (
+                f"{len(scans)} features of a scan: their vertices have a standard deviation of up"
+                f" to {max(scans):.1f} µm, which their form errors include"
+            )
         count = len(self.workpiece.triangles)
         if count > MAX_FEATURE_TRIANGLES:
             yield (

@@ -16,6 +16,7 @@ from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 from hashlib import sha256
 from io import StringIO
+from math import tau
 from typing import Any
 
 import numpy as np
@@ -47,8 +48,19 @@ from warpspace.kinematics.model import Loop
 from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import FULL_TURN_DEG, MAX_LINE_POINTS, MAX_PATH_POINTS
-from warpspace.parts import interpreter
-from warpspace.parts.interpreter import ParsedProgram
+from warpspace.parts.gcode.codes import COMPENSATING
+from warpspace.parts.gcode.control_settings import ControlSettings
+from warpspace.parts.gcode.cycles import CYCLES
+from warpspace.parts.gcode.interpreter import Interpreter, program_lines, read_program
+from warpspace.parts.gcode.motion import CORNERS
+from warpspace.parts.gcode.parsed import (
+    RAPID,
+    STAND,
+    ParsedProgram,
+    axes_at,
+    programmed_words,
+    with_length,
+)
 from warpspace.scene.model import Scene, check_magnitude, second_order
 from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.scene.text_files import one_line
@@ -57,7 +69,7 @@ from warpspace.units import Array, Integers
 TURN_DEG, STEP_MM = 2.0, 10.0  # most that axes, and arcs, move between samples
 RESIDUAL_UM, MAX_ITERATIONS = 1e-3, 20  # of the correction
 DECIMALS = 4  # of words in mm; in inches one more, in degrees two
-_MODES = {"G2", "G3", *interpreter.CYCLES, "G90", "G91"}  # not of a corrected program
+_MODES = {"G2", "G3", *CYCLES, "G90", "G91"}  # not of a corrected program
 _LAST = {"M0", "M1", "M2", "M5", "M9", "M30", "M60"}  # take effect when the axes have moved
 CHORD_MM = 0.01  # largest chordal deviation of a bent path between samples
 SAMPLES_AT_ONCE = 50_000
@@ -154,7 +166,7 @@ def _path_uncertainty(program: ParsedProgram, path: ToolPath) -> FieldUncertaint
     for tool_length in np.unique(length):
         rows = length == tool_length
         axes = {name: at[rows] for name, at in path.coordinates.items()}
-        model = interpreter.with_length(scene.model, tool_length)
+        model = with_length(scene.model, tool_length)
         response[:, rows] = uncertainty.respond(model, axes, view).position
     return combine(uncertainty, response, path.error_um, path.shares)
 
@@ -162,7 +174,7 @@ def _path_uncertainty(program: ParsedProgram, path: ToolPath) -> FieldUncertaint
 def count_samples(program: ParsedProgram, chord_mm: float) -> Integers:
     """Count the samples of each move, [m]; 0 without motion."""
     is_rotary = np.array([not is_linear(name) for name in program.axes])
-    moves = program.kind != interpreter.STAND
+    moves = program.kind != STAND
     change = np.abs(np.diff(program.end, axis=0, prepend=program.end[:1]))
     distance, turn = np.linalg.norm(change[:, ~is_rotary], axis=1), change[:, is_rotary]
     is_bent = (program.turn_rad != 0.0) | (~program.tcp & turn.any(axis=1))
@@ -204,11 +216,11 @@ def along_moves(
     view = scene.view(Loop.RELATIVE, "workpiece")
     for tcp, length in np.unique(modes, axis=0):
         (same,) = np.nonzero((modes == (tcp, length)).all(axis=1))
-        model = interpreter.with_length(scene.model, length)
+        model = with_length(scene.model, length)
         for rows in np.array_split(same, -(-len(same) // SAMPLES_AT_ONCE)):
             axes = {name: at[rows] for name, at in positions.items()}
             if tcp:
-                axes = interpreter.axes_at(scene.model, length, axes)
+                axes = axes_at(scene.model, length, axes)
             if shift_mm is not None:
                 axes = follow(model, axes, relative_point(model, axes) + shift_mm[rows])
             for name, axis in scene.machine.axes.items():
@@ -238,10 +250,10 @@ class PathPoint:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Program(interpreter.ControlSettings, Analysis):
+class Program(ControlSettings, Analysis):
     """Evaluate the errors along the path of a program on SCENE.
 
-    G-code: motion in three planes, offsets, lengths, tool centre point, rotation in the plane,
+    G-code: motion in three planes, offsets, lengths, tool centre point, frames, tilted planes,
     drilling cycles, subprograms. The path ends before a word that is neither executed nor known to
     move no axis; it is reported with its line. Errors are those of the tool against the workpiece,
     in the workpiece frame, actual − nominal. Geometry only: no forces, heat, wear or servo.
@@ -262,7 +274,7 @@ class Program(interpreter.ControlSettings, Analysis):
 
     def lines(self) -> Iterable[str]:
         file = self.file or ""
-        return interpreter.program_lines(file) if self.text is None else StringIO(self.text, None)
+        return program_lines(file) if self.text is None else StringIO(self.text, None)
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "ProgramResult":
         if self.file is None:
@@ -271,7 +283,7 @@ class Program(interpreter.ControlSettings, Analysis):
                 raise OptionError("{file} is missing; expected a program")
             tcp: Any = scene.part.tcp or self.tcp
             return replace(self, file=path, tcp=tcp).run(scene, watch)
-        program = interpreter.read_program(scene, self.lines(), self, self.file)
+        program = read_program(scene, self.lines(), self, self.file)
         watch(0.3)
         path = trace_program(program)
         watch(0.9)
@@ -281,7 +293,7 @@ class Program(interpreter.ControlSettings, Analysis):
         def explain_sample(sample: int) -> PathPoint:
             axes, length = path.axes_at(sample), float(program.length_mm[path.move[sample]])
             view = scene.view(Loop.RELATIVE, "workpiece")
-            model = interpreter.with_length(scene.model, length)
+            model = with_length(scene.model, length)
             parts = explain(model, scene.errors, axes, view).contributions
             ranked = sorted(parts, key=lambda part: -part.along_um)
             u95 = ExpandedUncertainty[float | None]()
@@ -297,8 +309,11 @@ class Program(interpreter.ControlSettings, Analysis):
             near = ", ".join(map(str, lines[np.argsort(np.abs(lines - self.at_line))][:3]))
             raise OptionError(f"{{at_line}} {self.at_line} moves no axis; expected {near}")
         deviation, along, across = path.deviations()
+        count = np.maximum(np.bincount(path.move, minlength=len(program.line)), 1)
+        angle = (np.abs(program.turn_rad) / count)[path.move]
+        length = np.linalg.norm(path.step_mm, axis=1) / np.sinc(angle / tau)  # of arcs, not chords
         return ProgramResult(
-            length_mm=float(np.linalg.norm(path.step_mm, axis=1).sum()),
+            length_mm=float(length.sum()),
             outside=int(path.outside.sum()),
             deviation=deviation,
             along=along,
@@ -350,7 +365,8 @@ class ProgramResult(Result):
         if self.program.dialect:
             yield f"Dialect: {self.program.signs or self.program.dialect}"
         if self.program.skipped:
-            yield f"Ignored because of --skip: {', '.join(self.program.skipped)}"
+            words = [f"{words} (line {line})" for words, line in self.program.skipped.items()]
+            yield f"Ignored because of --skip: {', '.join(words[:MAX_LISTED])}"
         if self.program.integer_word:
             word, line = self.program.integer_word
             numbers = "Numbers without a decimal point are mm or degrees"
@@ -362,12 +378,9 @@ class ProgramResult(Result):
         if refused:
             listed, first = ", ".join(refused[:MAX_LISTED]), next(iter(program.reasons.values()))
             yield f"refused: {listed}; the path ends before the first of them{first}"
-        for listing, title in (
-            (program.skipped, "ignored because of --skip"), (program.remarks, "remarks")
-        ):  # fmt: skip
-            entries = [f"{word} (line {line})" for word, line in listing.items()]
-            if entries:
-                yield f"{title}: {', '.join(entries[:MAX_LISTED])}"
+        remarks = [f"{word} (line {line})" for word, line in program.remarks.items()]
+        if remarks:
+            yield f"remarks: {', '.join(remarks[:MAX_LISTED])}"
         if program.unused:
             yield f"unused: --offset {', '.join(program.unused)}"
         if program.signs and not program.dialect:
@@ -408,7 +421,7 @@ def corrected_places(program: ParsedProgram, within_mm: float) -> tuple[Integers
     are within a tolerance of the correct path. Places are in the mode of `ParsedProgram.end`.
     """
     count = np.maximum(count_samples(program, within_mm / 4.0), 1)
-    count[program.kind == interpreter.RAPID] = 1
+    count[program.kind == RAPID] = 1
     row, _, places = _corrected(program, count)
     linear = [program.axes.index(name) for name in following_axes(program.scene.model)]
     bend = np.linalg.norm(np.diff(places[:, linear], 2, axis=0), axis=1) / within_mm
@@ -435,7 +448,7 @@ def _corrected(program: ParsedProgram, count: Integers) -> tuple[Integers, Array
     else:
         raise OptionError("no correction: the errors vary too much over the path")
     places = program.positions(row, share)
-    programmed = interpreter.programmed_words(program.scene.model, tip, axes)
+    programmed = programmed_words(program.scene.model, tip, axes)
     for name in following_axes(program.scene.model):
         linear = np.where(program.tcp[row], programmed[name], axes[name])
         places[:, program.axes.index(name)] = linear
@@ -449,7 +462,7 @@ def correct_program(analysis: Program, program: ParsedProgram) -> Iterator[str]:
         raise OptionError(f"line {line}: {word}{reason}")
     row, places = corrected_places(program, analysis.within_um / 1e3)
     scene, lines, line_of = program.scene, [*analysis.lines()], program.line[row]
-    state = interpreter.Interpreter(scene, analysis, analysis.file or "")
+    state = Interpreter(scene, analysis, analysis.file or "")
     linear = {name[0] for name in following_axes(scene.model)}
     missing = ", ".join(linear - state.index.keys())
     if missing:
@@ -464,10 +477,10 @@ def correct_program(analysis: Program, program: ParsedProgram) -> Iterator[str]:
             mode, named = (state.system, state.tcp), set()
         if state.once in {"G28", "G30", "G53", "G10", "G52"}:
             named -= letters or named
-        elif codes & {"M6", "G56", *interpreter.COMPENSATING} or "D" in state.words:
+        elif codes & {"M6", "G56", *COMPENSATING} or "D" in state.words:
             named -= {"Z"}
         places_here = np.arange(*np.searchsorted(line_of, [number, number + 1]))
-        moving = places_here[program.kind[row[places_here]] != interpreter.STAND]
+        moving = places_here[program.kind[row[places_here]] != STAND]
         if state.once or not (letters or len(moving)):
             block = [word for key, word in state.tokens if key not in _MODES]
             is_relative = state.once in {"G28", "G30"} and not state.absolute
@@ -506,23 +519,20 @@ def _header(scene: Scene, analysis: Program, dialect: str) -> Iterator[str]:
 
 
 def _blocks(
-    state: interpreter.Interpreter, letters: Sequence[str], kinds: Integers, places: Array
+    state: Interpreter, letters: Sequence[str], kinds: Integers, places: Array
 ) -> Iterator[str]:
     """Write the current line of a control as straight blocks to places, [n, a]."""
     number = [word for key, word in state.tokens if key == "N"]
     replaced = _MODES | _LAST | {"N", "G0", "G1", *state.index}
+    replaced |= {"CR", "RND", "CHR", *CORNERS, *("IJKLPQR" if state.cycle else "")}
     replaced |= {
-        "CR",
-        ",R",
-        ",C",
-        *("IJKLPQR" if state.cycle else ""),
         *("F" if state.inverse_time else ""),
+        *("IJKPR" if state.motion in {"G2", "G3"} else ""),
     }
-    replaced |= {*("IJKPR" if state.motion in {"G2", "G3"} else "")}
     other_words = [word for key, word in state.tokens if key not in replaced]
     last = [code for code in state.codes if code in _LAST]
     for index, (kind, place) in enumerate(zip(kinds, places, strict=True), start=1):
-        is_rapid = kind == interpreter.RAPID or (kind == interpreter.STAND and state.motion == "G0")
+        is_rapid = kind == RAPID or (kind == STAND and state.motion == "G0")
         block = ["G0" if is_rapid else "G1"]
         for letter in letters:
             position = float(place[state.index[letter]]) - state.place(letter, 0.0)

@@ -215,7 +215,10 @@ class WorkpieceAnalysis(Analysis):
     """An analysis of a workpiece where it is clamped."""
 
     file: File = option(
-        None, "Mesh, .stl, .obj, .ply or .glb", positional=True, unset="that of the scene"
+        None,
+        "Mesh, .stl, .obj, .ply, .glb, .3mf or .step",
+        positional=True,
+        unset="that of the scene",
     )
     place: Annotated[tuple[float, ...] | None, Grammar("X,Y,Z[,A,B,C]", read_place)] = option(
         None,
@@ -224,7 +227,7 @@ class WorkpieceAnalysis(Analysis):
         unset="that of the scene, or the middle of the working volume",
     )
     unit: Literal["mm", "cm", "m", "in"] | None = option(
-        None, "Unit of the mesh", unset="mm, of .glb m"
+        None, "Unit of the mesh", unset="mm, of .glb m, of .3mf and .step theirs"
     )
     mesh: Workpiece | None = None  # instead of a file
 

@@ -1,15 +1,17 @@
 """Readers of the curves of errors in scene files, and sums of curves."""
 
-import io
+import re
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import TextIO, cast
 
 import numpy as np
 
 from warpspace.exceptions import OptionError, SceneError, near_miss
 from warpspace.machine import limits
+from warpspace.machine.axes import PARAMETERS, is_linear, parameter
 from warpspace.machine.curves.curve import MISSING, ErrorFunction, Points, ValueReader, is_number
 from warpspace.machine.curves.registry import find_form, spell_forms
 from warpspace.machine.curves.simple import Constant, Directional, Harmonics, Poly, Ramp
@@ -136,56 +138,76 @@ def _sampled(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> T
 GUIDES = "guides"  # key of the positioning errors of the two guides of a gantry
 RUN, DIRECTION = "run", "direction"  # columns that a file of runs may have
 SIGNS = {1: FORWARD, -1: BACKWARD}
-T = TypeVar("T")
 
 
-def read_csv_column(path: Path, column: str) -> list[tuple[float, float]]:
+def read_csv_column(path: Path, column: str, where: str = "") -> list[tuple[float, float]]:
     """Read positions (mm or degrees, ascending, first column) and a named column (µm or µrad)."""
-    return _read_csv(path, lambda rows: _points(rows, column))
+    return _read_csv(path, lambda rows: _points(rows, column, where))
 
 
-def read_csv_runs(path: Path, column: str) -> tuple[TravelRun, ...]:
+def read_csv_runs(path: Path, column: str, where: str = "") -> tuple[TravelRun, ...]:
     """Read the runs of one error, one reading per row, with columns ``run`` and ``direction``."""
-    return _read_csv(path, lambda rows: _runs(rows, column))
+    return _read_csv(path, lambda rows: _runs(rows, column, where))
 
 
-def _read_csv(path: Path, read: Callable[[text_files.CsvRows], T]) -> T:
-    source = str(path)
-    text, _ = text_files.read_table_text(path, limits.MAX_CSV_BYTES)
-    rows = text_files.CsvRows(io.StringIO(text, newline=""), source, limits.MAX_POINTS)
-    content = read(rows)
-    rows.check()
-    return content
+def _read_csv(path: Path, read: Callable[[text_files.CsvRows], text_files.T]) -> text_files.T:
+    def parse(file: TextIO) -> text_files.T:
+        rows = text_files.CsvRows(file, str(path), limits.MAX_POINTS)
+        content = read(rows)
+        rows.check()
+        return content
+
+    return text_files.parse_table_file(path, limits.MAX_CSV_BYTES, parse)
 
 
-def _column(rows: text_files.CsvRows, column: str) -> tuple[int, float]:
-    """Find a column by its heading, with or without its unit, and the factor to µm or µrad."""
-    columns = rows.header[1:]
+def _units(where: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the units of positions and values of the error in the path of a finding."""
+    keys = [part for part in re.split(r"[.\[]", where) if part in PARAMETERS]
+    if not keys:
+        return ("mm", "deg"), ("um", "urad")
+    row = parameter(keys[-1])
+    return ("mm" if is_linear(row.axis) else "deg",), ("urad" if row.is_rotation else "um",)
+
+
+def _column(rows: text_files.CsvRows, column: str, where: str) -> tuple[int, int, float, float]:
+    """Find the columns of positions and of values, with or without their unit, and their factors.
+
+    Positions are in the first column that is neither the run nor the direction.
+    """
+    first = next(
+        (n for n, name in enumerate(rows.header) if name.lower() not in (RUN, DIRECTION)), 0
+    )
+    columns = rows.header[first + 1 :]
     headings = columns
     if column not in columns:
         plain = [text_files.plain_heading(name) for name in columns]
         headings = [name.removesuffix(f"_{text_files.heading_unit(name)}") for name in plain]
     if headings.count(column) == 1:
         index = headings.index(column)
-        return index + 1, _factor(columns[index], ("um", "urad"))
+        position, error = _units(where)
+        scale = _factor(rows, rows.header[first], position)
+        return first, first + 1 + index, scale, _factor(rows, columns[index], error)
     problem = "occurs twice" if column in headings else "not found"
     hint = "" if column in headings else near_miss(column, columns)
     raise SceneError(rows.source, [f"column {column!r} {problem}{hint}"])
 
 
-def _factor(heading: str, targets: tuple[str, str]) -> float:
+def _factor(rows: text_files.CsvRows, heading: str, targets: tuple[str, ...]) -> float:
     """Return the factor from the unit of a heading to that of its quantity; 1 without a unit."""
     unit = text_files.heading_unit(heading)
     factors = [text_files.unit_factor(unit, target) for target in targets]
-    return next((factor for factor in factors if factor), 1.0)
+    factor = next((factor for factor in factors if factor), None)
+    if factor is None and (unit or heading.endswith("]")):
+        expected = f"expected a unit such as {' or '.join(targets)}"
+        raise SceneError(rows.source, [f"column {heading!r}; {expected}"])
+    return factor or 1.0
 
 
-def _points(rows: text_files.CsvRows, column: str) -> list[tuple[float, float]]:
+def _points(rows: text_files.CsvRows, column: str, where: str) -> list[tuple[float, float]]:
     points: list[tuple[float, float]] = []
-    index, factor = _column(rows, column) if rows.header else (0, 1.0)
-    scale = _factor(rows.header[0], ("mm", "deg")) if rows.header else 1.0
+    first, index, scale, factor = _column(rows, column, where) if rows.header else (0, 0, 1.0, 1.0)
     for line, row in rows:
-        position = scale * rows.number(row[0], line, limit=limits.MAX_ERROR / scale)
+        position = scale * rows.number(row[first], line, limit=limits.MAX_ERROR / scale)
         value = factor * rows.number(row[index], line, limit=limits.MAX_ERROR / factor)
         if points and position <= points[-1][0]:
             problem = f"position {position:g} after {points[-1][0]:g}"
@@ -196,11 +218,11 @@ def _points(rows: text_files.CsvRows, column: str) -> list[tuple[float, float]]:
     return points
 
 
-def _runs(rows: text_files.CsvRows, column: str) -> tuple[TravelRun, ...]:
-    value_at, factor = _column(rows, column)
-    scale = _factor(rows.header[0], ("mm", "deg"))
+def _runs(rows: text_files.CsvRows, column: str, where: str) -> tuple[TravelRun, ...]:
+    position_at, value_at, scale, factor = _column(rows, column, where)
+    headings = [name.lower() for name in rows.header]
     run_at, direction_at = (
-        rows.header.index(name) if name in rows.header else None for name in (RUN, DIRECTION)
+        headings.index(name) if name in headings else None for name in (RUN, DIRECTION)
     )
     readings: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for line, row in rows:
@@ -209,7 +231,7 @@ def _runs(rows: text_files.CsvRows, column: str) -> tuple[TravelRun, ...]:
         if text and direction == UNKNOWN:
             spelling = text_files.spell_value(text)
             rows.note(f"line {line}: direction {spelling}; expected +, - or nothing")
-        position = scale * rows.number(row[0], line, limit=limits.MAX_LENGTH_MM / scale)
+        position = scale * rows.number(row[position_at], line, limit=limits.MAX_LENGTH_MM / scale)
         value = factor * rows.number(row[value_at], line, limit=limits.MAX_ERROR / factor)
         run = "" if run_at is None else text_files.unguard_cell(row[run_at])
         readings.setdefault((run, direction), []).append((position, value))
@@ -245,7 +267,9 @@ class CurveReader:
             return None
         reader = ValueReader(
             # a constant is a number: the file of a table is not read
-            (lambda _file, _column: ()) if constant else self.folder and self._csv_points,
+            (lambda _file, _column: ())
+            if constant
+            else self.folder and partial(self._csv_points, where),
             axis=self.axis,
             axes=self.axes,
             nested=lambda part, path: self._read(part, text_files.location(where, path), constant),
@@ -264,8 +288,8 @@ class CurveReader:
         self.problems.only(where, table, form, "key")
         return curve
 
-    def _csv_points(self, file: str, column: str) -> Points:
-        return read_csv_column(cast("Path", self.folder) / file, column)
+    def _csv_points(self, where: str, file: str, column: str) -> Points:
+        return read_csv_column(cast("Path", self.folder) / file, column, where)
 
     def guides(
         self,

@@ -479,7 +479,7 @@ class _Document:
             self.problems.add(where, f"CSV files are not read here; {expected}")
             return ()
         try:
-            return read_csv_runs(self.folder / csv, column)
+            return read_csv_runs(self.folder / csv, column, where)
         except SceneError as error:
             for problem in error.problems:
                 self.problems.add(where, f"{error.source}: {problem}")

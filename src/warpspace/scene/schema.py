@@ -369,11 +369,14 @@ def _band(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
     return -half_width, half_width
 
 
+LEAST_SQUARES, EXTREME_FITS = "least squares", ("inscribed", "circumscribed")
+FITS = LEAST_SQUARES, "minimum zone", *EXTREME_FITS
 _FEATURE = TableSchema(
     {
         "name": (_text(100, 1, *_LINE), ""),
         "is": (_text(100, 1), MISSING),
         "near": (POINT, None),
+        "fit": (_one_of(FITS), ""),
         "measure": (_text(100), ""),
         "to": (_list(_text(100, 1), 6), ()),
         "tolerance_um": (_band, None),

@@ -9,13 +9,13 @@ import sys
 import time as clock
 import tomllib
 import zipfile
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from datetime import date, time
 from importlib import import_module
 from itertools import chain
 from pathlib import Path
-from typing import TextIO
+from typing import TextIO, TypeVar
 
 from warpspace.exceptions import OutputError, SceneError
 from warpspace.machine import limits
@@ -24,6 +24,7 @@ if sys.platform != "win32":
     import fcntl
 
 LOCK_WAIT_S = 60.0
+T = TypeVar("T")
 
 # The memory of a TOML reader grows with the square of the parts of one key, and with each table.
 # One pass over the text, in linear time, counts both.
@@ -89,20 +90,37 @@ def read_table_text(path: Path, limit_bytes: int) -> tuple[str, tuple[str, ...]]
     return decode_text(read_bytes(path, limit_bytes), str(path))
 
 
+def parse_table_file(path: Path, limit_bytes: int, parse: Callable[[TextIO], T]) -> T:
+    """Parse a table in any encoding; UTF-8 is read line by line, in bounded memory."""
+    check_file(path, limit_bytes, str(path))
+    try:
+        with path.open("rb") as file:
+            sample = file.read(_SAMPLE_BYTES)
+        if not (sample.startswith(SPREADSHEET) or _utf16(sample)):
+            with path.open(encoding="utf-8-sig", newline="") as file:
+                return parse(file)
+    except UnicodeDecodeError:
+        pass
+    except OSError as error:
+        raise SceneError(str(path), [f"cannot be read: {error.strerror or error}"]) from None
+    return parse(io.StringIO(read_table_text(path, limit_bytes)[0], newline=""))
+
+
 SPREADSHEET = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """First bytes of .xlsx and .ods, and of .xls."""
+_SAMPLE_BYTES = 4096
 _UTF16_SHARE = 0.3
 """Smallest share of zero bytes at every other position of UTF-16 without a byte order mark."""
 
 
-def decode_text(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
+def decode_text(content: bytes, name: str, errors: str = "strict") -> tuple[str, tuple[str, ...]]:
     """Decode text in UTF-8, UTF-16 or Windows-1252, or a spreadsheet, with notes."""
     if content.startswith(SPREADSHEET):
         return _sheet_text(content, name)
     encoding = _utf16(content)
     if encoding:
         try:
-            return content.decode(encoding), ("read as UTF-16",)
+            return content.decode(encoding, errors), ("read as UTF-16",)
         except UnicodeDecodeError:
             problem = "begins as UTF-16 text, but is not valid; expected a text file"
             raise SceneError(name, [problem]) from None
@@ -110,7 +128,7 @@ def decode_text(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
         return content.decode("utf-8-sig"), ()
     except UnicodeDecodeError as error:
         try:
-            text = content.decode("cp1252")
+            text = content.decode("cp1252", errors)
         except UnicodeDecodeError:
             problem = f"is not text in UTF-8, UTF-16 or Windows-1252 (byte {error.start})"
             raise SceneError(name, [f"{problem}; expected a text file"]) from None
@@ -150,7 +168,7 @@ def _sheet_text(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
 def _utf16(content: bytes) -> str:
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
-    sample = content[:4096]
+    sample = content[:_SAMPLE_BYTES]
     half = len(sample) // 2
     if half < 2:
         return ""
@@ -165,8 +183,9 @@ def read_bytes(path: Path, limit_bytes: int, source: str | None = None) -> bytes
     source = source or str(path)
     check_file(path, limit_bytes, source)
     try:
+        size = path.stat().st_size or limit_bytes  # `read` allocates all that it may return
         with path.open("rb") as file:
-            content = file.read(limit_bytes + 1)
+            content = file.read(min(size, limit_bytes) + 1)
     except OSError as error:
         raise SceneError(source, [f"cannot be read: {error.strerror or error}"]) from None
     if len(content) > limit_bytes:  # some system files report a size of zero
@@ -313,8 +332,10 @@ _TURN_RAD = 1.001 * math.tau
 _WHOLE_DEG = 0.02
 _MAX_LINES_OF_ROW = 20  # lines of one row, with line breaks in texts
 _NUMBER = re.compile(r"[+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?", re.ASCII)
+_BLANKS = re.compile(r"\s+(?![\[(])")
+"""Blanks between headings, not those before a unit."""
 _SEP = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
-_UNIT = str.maketrans({"µ": "u", "μ": "u", "°": "deg"})
+UNIT_SPELLING = str.maketrans({"µ": "u", "μ": "u", "°": "deg", **dict.fromkeys('"″', "arcsec")})
 Row = tuple[int, list[str]]
 """Number of the last line of a row, and its cells without surrounding blanks."""
 
@@ -344,18 +365,24 @@ LENGTH_UM: Mapping[str, float] = {
     **dict.fromkeys(("in", "inch"), 25_400.0),
     "thou": 25.4,
 }
+"""Micrometres per unit of length."""
 ANGLE_URAD: Mapping[str, float] = {
     "urad": 1.0,
     "mrad": 1e3,
     "rad": 1e6,
     "arcsec": math.pi / 180.0 / 3600.0 * 1e6,
     "deg": math.pi / 180.0 * 1e6,
+    "um/m": 1.0,
+    "mm/m": 1e3,
 }
+"""Microradians per unit of angle."""
 POSITION_UNITS = {"mm", "m", "in", "inch", "deg", "rad"}
 """Units of positions; a short heading such as x_mm is no deviation x_um."""
 DIRECTIONS: Mapping[str, int] = {
-    **dict.fromkeys(("+", "1", "+1", "↑", "forward", "forwards", "fwd", "positive"), 1),
-    **dict.fromkeys(("-", "−", "-1", "↓", "backward", "backwards", "reverse", "rev"), -1),
+    **dict.fromkeys(("+", "1", "+1", "↑", "forward", "forwards", "fwd", "positive", "vorwärts"), 1),
+    **dict.fromkeys(
+        ("-", "−", "-1", "↓", "backward", "backwards", "reverse", "rev", "rückwärts"), -1
+    ),
     "negative": -1,
 }
 """Directions of travel in tables, in lower case."""
@@ -412,8 +439,23 @@ def plain_heading(text: str) -> str:
     for opening, closing in ("[]", "()"):
         name, _, unit = bare[:-1].rpartition(opening)
         if bare.endswith(closing) and name.strip() and unit.strip() and not {*"[]()"} & {*unit}:
-            return f"{name.rstrip()}_{unit.strip().translate(_UNIT)}"
+            return f"{name.rstrip()}_{unit.strip().translate(UNIT_SPELLING)}"
     return bare
+
+
+GERMAN = {
+    "abweichung": "deviation",
+    **dict.fromkeys(("sollposition", "zielposition"), "target"),
+    "richtung": "direction",
+    "lauf": "run",
+}
+"""Headings by their German spelling."""
+
+
+def translate_heading(heading: str) -> str:
+    """Translate a German heading of a table of readings, with or without a unit."""
+    name = re.split(r"[\[(_]", heading, maxsplit=1)[0]
+    return GERMAN.get(name.strip().lower(), name) + heading[len(name) :]
 
 
 def radian_notes(columns: Mapping[str, Sequence[float]]) -> tuple[str, ...]:
@@ -460,16 +502,31 @@ MAX_PREAMBLE = 40  # lines above the header
 MIN_RUN_COLUMNS = 2
 DEVIATION = "deviation"
 """Heading of readings in columns of runs that state no unit."""
-_RUN_HEADING = re.compile(r"(?:run\s*)?(\d+)\s*([^\d\s\[(]+)\s*(\[.*\]|\(.*\))?", re.IGNORECASE)
+_RUN_HEADING = re.compile(
+    r"(?:(?:run|lauf)\s*)?(\d+)\s*([^\d\s\[(]+)\s*(\[.*\]|\(.*\))?", re.IGNORECASE
+)
 
 
 def _mark(line: str) -> str:
     bare = re.sub(r'"[^"]*("|$)', "", line)
-    return next((mark for mark in MARKS if mark in bare), ",")
+    headings = _BLANKS.split(line.strip())
+    has_blanks = len(headings) > 1 and all(
+        heading_unit(name) or name.lower() in ("run", "direction") for name in headings
+    )
+    return next((mark for mark in MARKS if mark in bare), " " if has_blanks else ",")
 
 
 def _cells(line: str, mark: str) -> list[str]:
-    return [cell.strip().strip('"') for cell in line.split(mark)]
+    cells = _BLANKS.split(line.strip()) if mark == " " else line.split(mark)
+    return [cell.strip().strip('"') for cell in cells]
+
+
+def _run(text: str) -> tuple[str, str, str] | None:
+    """Return run, direction and unit of a heading such as ``2 ↑ [µm]`` or ``run 2 backward``."""
+    match = _RUN_HEADING.fullmatch(text)
+    if match is None or match[2].strip().lower() not in DIRECTIONS:
+        return None
+    return match[1], match[2].strip(), (match[3] or "").strip("[]() ")
 
 
 class CsvRows:
@@ -479,6 +536,7 @@ class CsvRows:
         self.source, self.problems = source, list[str]()
         self._file, self._max_rows, self._unique = file, max_rows, unique
         self._number = self._since_row = self._width = 0
+        self._has_run_rows = False
         self._signs: dict[str, str] = {}
         self._repeated: list[str] = []
         self._remarks: list[str] = []
@@ -497,7 +555,7 @@ class CsvRows:
             self.header.pop()
         self._trails = width > len(self.header) or self.mark != ","
         self._merge_units()
-        self.runs = self._runs_in_columns()
+        self.runs = self._runs_in_columns() or self._runs_in_rows()
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -523,10 +581,12 @@ class CsvRows:
             self._since_row = 0
             candidate = next(lines, "")
         ahead.append((self._number, candidate))
+        self._since_row = 0
         return first, chain(self._replay(ahead), lines)
 
     def _replay(self, ahead: Sequence[tuple[int, str]]) -> Iterator[str]:
         for self._number, line in ahead:
+            self._count_row_line()
             yield line
 
     def _merge_units(self) -> None:
@@ -536,7 +596,7 @@ class CsvRows:
         row = next(self._rows, None)
         if row is None:
             return
-        units = [cell.strip("[]()").translate(_UNIT) for cell in row[1]]
+        units = [cell.strip("[]()").translate(UNIT_SPELLING) for cell in row[1]]
         if len(units) == len(self.header) and all(
             unit_factor(unit, unit) for unit in units if unit
         ):
@@ -545,15 +605,11 @@ class CsvRows:
         else:
             self._rows = chain([row], self._rows)
 
-    def _runs_in_columns(self) -> dict[int, tuple[str, str]]:
+    def _runs_in_columns(self) -> dict[int, tuple[str, ...]]:
         """Return run and direction of each column of readings; such columns become rows."""
-        runs: dict[int, tuple[str, str]] = {}
-        units = set[str]()
-        for index, heading in enumerate(self.header):
-            match = _RUN_HEADING.fullmatch(heading)
-            if match and match[2].strip().lower() in DIRECTIONS:
-                runs[index] = match[1], match[2].strip()
-                units.add((match[3] or "").strip("[]() "))
+        pairs = {index: _run(heading) for index, heading in enumerate(self.header)}
+        runs: dict[int, tuple[str, ...]] = {at: run[:2] for at, run in pairs.items() if run}
+        units = {run[2] for run in pairs.values() if run}
         if len(runs) < MIN_RUN_COLUMNS or len(units) > 1:
             return {}
         self._remarks.append(f"{len(runs)} runs in columns")
@@ -563,9 +619,20 @@ class CsvRows:
         self.header = [*headings, "run", "direction", f"deviation [{unit}]" if unit else DEVIATION]
         return runs
 
+    def _runs_in_rows(self) -> dict[int, tuple[str, ...]]:
+        """Return the position of each column of readings where each row is a run."""
+        positions = {index: (cell,) for index, cell in enumerate(self.header) if index}
+        is_run = positions and all(_is_number(cell) for (cell,) in positions.values())
+        if not is_run or not heading_unit(self.header[0]):
+            return {}
+        self._remarks.append("runs in rows")
+        self._width, self._has_run_rows = len(self.header), True
+        self.header = [self.header[0], "run", "direction", DEVIATION]
+        return positions
+
     def __iter__(self) -> Iterator[Row]:
         """Return the rows below the header that have as many cells."""
-        width = self._width if self.runs else len(self.header)
+        width = self._width or len(self.header)
         first_lines: dict[tuple[str, ...], int] = {}
         for count, (line, cells) in enumerate(self._rows):
             if count >= self._max_rows:
@@ -581,12 +648,20 @@ class CsvRows:
             elif self._unique and first_lines.setdefault(tuple(cells), line) != line:
                 self._repeated.append(f"line {line} is line {first_lines[tuple(cells)]} again")
             elif self.runs:
-                conditions = [cell for index, cell in enumerate(cells) if index not in self.runs]
-                for index, run in self.runs.items():
-                    if cells[index]:
-                        yield line, [*conditions, *run, cells[index]]
+                yield from self._readings_of_row(line, cells)
             else:
                 yield line, cells
+
+    def _readings_of_row(self, line: int, cells: Sequence[str]) -> Iterator[Row]:
+        before: Sequence[str] = [cell for at, cell in enumerate(cells) if at not in self.runs]
+        run = _run(before[0]) if self._has_run_rows else None
+        if self._has_run_rows and (run is None or run[2]):
+            self.note(f"line {line}: {spell_value(before[0])}; expected a run such as 2 ↑")
+            return
+        for index, condition in self.runs.items():
+            labels = [*condition, *run[:2]] if run else [*before, *condition]
+            if cells[index]:
+                yield line, [*labels, cells[index]]
 
     def number(
         self, text: str, line: int, what: str = "", limit: float = math.inf, hint: str = ""
@@ -631,10 +706,13 @@ class CsvRows:
                 raise SceneError(self.source, [problem])
             if not self._since_row and line.lstrip().startswith("#"):
                 continue
-            self._since_row += 1
-            if self._since_row > _MAX_LINES_OF_ROW:
-                raise csv.Error("a quoted text does not end")
+            self._count_row_line()
             yield line
+
+    def _count_row_line(self) -> None:
+        self._since_row += 1
+        if self._since_row > _MAX_LINES_OF_ROW:
+            raise csv.Error("a quoted text does not end")
 
     def _first(self, lines: Iterator[str]) -> str:
         for line in lines:
@@ -644,6 +722,8 @@ class CsvRows:
         return ""
 
     def _split(self, lines: Iterator[str]) -> Iterator[Row]:
+        if self.mark == " ":
+            lines = (" ".join(re.sub(r"\s+(?=[\[(])", "", line).split()) for line in lines)
         try:
             for row in csv.reader(lines, delimiter=self.mark, strict=True):
                 self._since_row = 0

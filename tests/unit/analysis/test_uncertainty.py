@@ -11,8 +11,9 @@ from warpspace import load_scene
 from warpspace.analysis.commands.conformance import Conformance
 from warpspace.analysis.commands.form import Form
 from warpspace.analysis.commands.line import Line
-from warpspace.analysis.statistics import volume_statistics
+from warpspace.analysis.statistics import statistics, volume_statistics
 from warpspace.analysis.uncertainty.propagation import (
+    combine,
     coverage_factor,
     field_uncertainty,
     scene_uncertainty,
@@ -20,6 +21,7 @@ from warpspace.analysis.uncertainty.propagation import (
 )
 from warpspace.bench.base import find_test, run_test
 from warpspace.exceptions import SceneError
+from warpspace.field.evaluate import ErrorField
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import complete_coordinates
 from warpspace.machine.errors import Covariance
@@ -227,3 +229,12 @@ KEYS = '["EC0Y", "EA0Z"]'
 def test_bad_statements_are_refused_by_name(old, new, said):
     with pytest.raises(SceneError, match=said):
         parse_scene(TWO.replace(old, new), "s")
+
+
+def test_p95_of_few_large_shares_is_not_certain():
+    errors = scene_uncertainty(parse_scene(ALONE, "s"))
+    error = np.arange(1.0, 301.0)[:, None] * [1.0, 0.0, 0.0]
+    shares = np.r_[np.full(298, 0.4 / 298), 0.2, 0.4]  # none lies within 1 % of 95 %
+    field = combine(errors, error[None], error, shares)
+    summary = statistics(ErrorField(error, error, error), shares=shares)
+    assert field.counts @ field.norm_um == pytest.approx(summary.four)

@@ -8,6 +8,7 @@ import os
 import re
 import struct
 import time
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,9 @@ import pytest
 import trimesh
 
 from warpspace.bodies.mesh import open_meshes
-from warpspace.bodies.mesh_files import FORMATS, frame_meshes, load_mesh, read_mesh
+from warpspace.bodies.mesh_files import FORMATS, check_meshes, frame_meshes, load_mesh, read_mesh
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
+from warpspace.scene.library import load_scene
 from warpspace.scene.urdf import place_robot, read_robot
 
 SIZE = np.array([300.0, 200.0, 100.0])
@@ -111,7 +113,7 @@ def corrupted(tmp_path_factory):
         ("nan.stl", "a vertex is not finite", {}),
         ("inf.stl", "a vertex is not finite", {}),
         ("box.ply", "no PLY file .* refers to a missing vertex", {}),
-        ("a.step", r"unknown ending; expected one of \.stl", {}),
+        ("a.iges", r"unknown ending; expected one of \.stl", {}),
         ("a.stl", "'feet'; expected one of mm, cm, m, in", {"unit": "feet"}),
     ],
 )
@@ -516,3 +518,157 @@ def test_an_ambiguous_stl_is_refused(content, message, tmp_path):
     path.write_bytes(content.encode() if isinstance(content, str) else content)
     with pytest.raises(OptionError, match=message):
         load_mesh(path, "R")
+
+
+def test_a_repaired_stl_of_a_robot_is_reported(tmp_path):
+    (tmp_path / "link.stl").write_bytes(BINARY_STL + b"spare")
+    shape = '<visual><geometry><mesh filename="link.stl"/></geometry></visual>'
+    robot, _ = read_robot(urdf(tmp_path / "a.urdf", 2, shape * 2))
+    meshes, notes, _ = frame_meshes(robot, place_robot(robot, "a.urdf").frame_of, tmp_path)
+    assert notes == [f"{tmp_path / 'link.stl'}: 5 bytes after its last triangle are ignored"]
+    assert sum(len(mesh.faces) for mesh in meshes.values()) == 12 * 2
+
+
+def test_a_repaired_stl_of_a_machine_is_reported(tmp_path):
+    (tmp_path / "bed.stl").write_bytes(BINARY_STL + b"spare")
+    text = (
+        '[machine]\nchain = "wFXYZt"\n[bodies]\nR = "bed.stl"\n'
+        "[workspace]\nX = [0, 1]\nY = 0\nZ = 0\n"
+    )
+    (tmp_path / "m.toml").write_text(text)
+    (remark,) = check_meshes(load_scene(tmp_path / "m.toml").machine)
+    assert remark.endswith("bed.stl: 5 bytes after its last triangle are ignored")
+
+
+def package_3mf(unit, mesh):
+    """A 3MF package of one object, which is placed 5 units along x."""
+    vertices = "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for x, y, z in mesh.vertices)
+    triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in mesh.faces)
+    model = (
+        f'<model {unit} xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">'
+        f'<resources><object id="1"><mesh><vertices>{vertices}</vertices>'
+        f"<triangles>{triangles}</triangles></mesh></object></resources>"
+        '<build><item objectid="1" transform="1 0 0 0 1 0 0 0 1 5 0 0"/></build></model>'
+    )
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("3D/3dmodel.model", model)
+    return data.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("unit", "mm"),
+    [("", 1.0), ('unit="millimeter"', 1.0), ('unit="inch"', 25.4), ('unit="micron"', 1e-3)],
+)
+def test_a_3mf_file_has_its_own_unit(unit, mm):
+    mesh, notes = read_mesh(Path("a.3mf"), None, data=package_3mf(unit, box()))
+    assert notes == ()
+    shift = np.array([5.0, 0.0, 0.0])
+    np.testing.assert_allclose(mesh.bounds, [mm * shift, mm * (SIZE + shift)])
+    with pytest.raises(OptionError, match="unit 'in'; expected none, the file states it"):
+        read_mesh(Path("a.3mf"), "in", data=package_3mf(unit, box()))
+
+
+def test_a_3mf_file_that_is_damaged_or_too_large_is_refused():
+    data = package_3mf("", box())
+    with pytest.raises(OptionError, match="no 3MF file that can be read"):
+        read_mesh(Path("a.3mf"), None, data=data[:-30])
+    with pytest.raises(OptionError, match="unit 'league'; expected one of micron"):
+        read_mesh(Path("a.3mf"), None, data=package_3mf('unit="league"', box()))
+    with pytest.raises(OptionError, match="12 triangle tags; expected at most 5"):
+        read_mesh(Path("a.3mf"), None, 5, data=package_3mf("", box()))
+
+
+def step_box(x, y, z, unit):
+    """A box as STEP, AP214: corners, edges, planes and a shell, written by hand."""
+    lines: list[str] = []
+
+    def add(entity):
+        lines.append(f"#{len(lines) + 1}={entity};")
+        return f"#{len(lines)}"
+
+    def vector(values):
+        return "({:.1f},{:.1f},{:.1f})".format(*values)
+
+    corners = np.array([(i, j, k) for i in (0, x) for j in (0, y) for k in (0, z)], float)
+    points = [add(f"CARTESIAN_POINT('',{vector(corner)})") for corner in corners]
+    ends = [add(f"VERTEX_POINT('',{point})") for point in points]
+    edges: dict[tuple[int, int], str] = {}
+    faces: list[str] = []
+    for loop in (
+        (0, 1, 3, 2),
+        (4, 6, 7, 5),
+        (0, 4, 5, 1),
+        (2, 3, 7, 6),
+        (0, 2, 6, 4),
+        (1, 5, 7, 3),
+    ):
+        oriented: list[str] = []
+        for i, j in zip(loop, np.roll(loop, -1).tolist(), strict=True):
+            if (j, i) not in edges:
+                step = corners[j] - corners[i]
+                along = add(f"DIRECTION('',{vector(step / np.linalg.norm(step))})")
+                length = add(f"VECTOR('',{along},1.0)")
+                line = add(f"LINE('',{points[i]},{length})")
+                edges[i, j] = add(f"EDGE_CURVE('',{ends[i]},{ends[j]},{line},.T.)")
+            edge, sense = edges.get((i, j)) or edges[j, i], ".T." if (i, j) in edges else ".F."
+            oriented.append(add(f"ORIENTED_EDGE('',*,*,{edge},{sense})"))
+        bound = add(f"EDGE_LOOP('',({','.join(oriented)}))")
+        bound = add(f"FACE_OUTER_BOUND('',{bound},.T.)")
+        first, second = corners[loop[1]] - corners[loop[0]], corners[loop[2]] - corners[loop[1]]
+        normal = np.cross(first, second)
+        normal = add(f"DIRECTION('',{vector(normal / np.linalg.norm(normal))})")
+        first = add(f"DIRECTION('',{vector(first / np.linalg.norm(first))})")
+        axes = add(f"AXIS2_PLACEMENT_3D('',{points[loop[0]]},{normal},{first})")
+        plane = add(f"PLANE('',{axes})")
+        faces.append(add(f"ADVANCED_FACE('',({bound}),{plane},.T.)"))
+    shell = add(f"CLOSED_SHELL('',({','.join(faces)}))")
+    solid = add(f"MANIFOLD_SOLID_BREP('',{shell})")
+    length = add(f"(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT({unit},.METRE.))")
+    angle = add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))")
+    context = add(
+        "(GEOMETRIC_REPRESENTATION_CONTEXT(3)"
+        f"GLOBAL_UNIT_ASSIGNED_CONTEXT(({length},{angle}))REPRESENTATION_CONTEXT('',''))"
+    )
+    origin = add("CARTESIAN_POINT('',(0.,0.,0.))")
+    axes = add(f"AXIS2_PLACEMENT_3D('',{origin},$,$)")
+    shape = add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('',({axes},{solid}),{context})")
+    application = add("APPLICATION_CONTEXT('')")
+    surroundings = add(f"PRODUCT_CONTEXT('',{application},'')")
+    product = add(f"PRODUCT('box','box','',({surroundings}))")
+    formation = add(f"PRODUCT_DEFINITION_FORMATION('','',{product})")
+    design = add(f"PRODUCT_DEFINITION_CONTEXT('',{application},'')")
+    definition = add(f"PRODUCT_DEFINITION('','',{formation},{design})")
+    definition = add(f"PRODUCT_DEFINITION_SHAPE('','',{definition})")
+    add(f"SHAPE_DEFINITION_REPRESENTATION({definition},{shape})")
+    header = "FILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n"
+    header += "FILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\n"
+    body = "\n".join(lines)
+    return (
+        f"ISO-10303-21;\nHEADER;\n{header}ENDSEC;\nDATA;\n{body}\nENDSEC;\nEND-ISO-10303-21;\n"
+    ).encode()
+
+
+@pytest.mark.parametrize(("unit", "mm"), [(".MILLI.", 1.0), ("$", 1000.0), (".CENTI.", 10.0)])
+@pytest.mark.parametrize("ending", ["step", "stp"])
+def test_a_step_file_has_its_own_unit(unit, mm, ending):
+    mesh, notes = read_mesh(Path(f"a.{ending}"), None, data=step_box(30, 20, 10, unit))
+    assert (notes, len(mesh.faces)) == ((), 12)
+    np.testing.assert_allclose(mesh.bounds, mm * np.array([(0, 0, 0), (30, 20, 10)]), rtol=1e-6)
+
+
+def test_a_step_file_that_is_damaged_is_refused():
+    data = step_box(30, 20, 10, ".MILLI.")
+    with pytest.raises(OptionError, match=r"line \d+: the file is cut off; expected END-ISO"):
+        read_mesh(Path("a.step"), None, data=data[:-100])
+    with pytest.raises(OptionError, match="line 1: expected ISO-10303-21;"):
+        read_mesh(Path("a.step"), None, data=b"solid x\n")
+
+
+def test_a_missing_package_is_named_with_its_extra(monkeypatch):
+    def load(*_args, **_keywords):
+        raise ModuleNotFoundError(name="cascadio")
+
+    monkeypatch.setattr(trimesh, "load_scene", load)
+    with pytest.raises(OptionError, match=r"needs cascadio: pip install 'warpspace\[step\]'"):
+        read_mesh(Path("a.step"), None, data=step_box(30, 20, 10, ".MILLI."))

@@ -1,12 +1,14 @@
 """Compensation: what is written is read back, evaluated as the controller does, and applied."""
 
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
 
-from warpspace.exceptions import OptionError
+from warpspace.exceptions import OptionError, SceneError
 from warpspace.formats.compensation.compensate import Compensate, compensate, sweep
 from warpspace.formats.compensation.corrections import build_corrector
 from warpspace.formats.kinds import fanuc_3d
@@ -395,3 +397,19 @@ def test_a_product_of_tables_in_one_direction_is_half_in_the_mean():
     assert values == [6.0, 0.0, 3.0]
     twice = Product(first, replace(second, direction=1))
     assert float(twice.corrections(at, 0)["X"]) == 3.0
+
+
+UNKNOWN = ("UNKNOWN_KEY = 5", "[unknown_section]", "UNKNOWN 1 2 3", "M999 X1", "setp unknown 5")
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_lines_that_are_not_read_are_named_or_refused(name):
+    scene = scene_with("EXX = { ramp = 20 }\nEC0Y = 30")
+    sources = sources_of(corrected(scene, name))
+    for index, line in product(range(len(sources)), UNKNOWN):
+        lines = (*sources[index].lines, line)
+        changed = [*sources]
+        changed[index] = replace(sources[index], lines=lines)
+        with suppress(SceneError):
+            notes = read_errors(changed, ReadOptions(scene.machine), name).imported.notes
+            assert any(line.split()[0] in note for note in notes), line

@@ -10,14 +10,16 @@ import pytest
 from bench_scenes import scene_with
 from warpspace.bench.base import find_test, run_test
 from warpspace.calibration.readings import parse_reading_table
+from warpspace.calibration.registry import parse_readings
 from warpspace.exceptions import SceneError
 from warpspace.formats.measured import BACKWARD, FORWARD
-from warpspace.formats.registry import ReadOptions, open_files, read_errors
+from warpspace.formats.registry import ReadOptions, open_files, read_errors, recognise
 from warpspace.formats.source import source_of_text
 from warpspace.formats.to_scene import build_imported_scene
 from warpspace.kinematics.chain import loop_error, nominal_point
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import ErrorSet
+from warpspace.scene.curve_reader import read_csv_runs
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.text_files import match_column
 
@@ -137,6 +139,11 @@ def test_klipper_probes_by_their_offset(probe):
     imported = read(text, "printer.cfg")
     assert [error.key for error in imported.series] == ["EAX"]
     assert any("ignored zy_compensations: x_offset 0 mm" in note for note in imported.notes)
+
+
+def test_klipper_heights_with_a_decimal_comma_are_refused():
+    with pytest.raises(SceneError, match="line 7: z_compensations -0,030000"):
+        read(TWIST.replace("= -0.03", "= -0,03"), "printer.cfg")
 
 
 def test_klipper_twist_with_two_probes_is_refused():
@@ -293,6 +300,51 @@ def test_linuxcnc_tables_of_the_other_type_are_refused(variant, text, message):
         read(text, "x.comp", axis="X", variant=variant)
 
 
+NAMED = {
+    "a list of Renishaw": "Renishaw compensation\nCompensation type: Mean\n",
+    "pitch error data of FANUC": "%\nN10000 Q1 P0\nN10001 Q1 P-1\nN03620 Q0 A1 P1 A2 P40\n%\n",
+    "a screw compensation table of Centroid": "24 -1448819\n0\n-32\n-38\n",
+    "a HEIDENHAIN digital readout": "#\nND-280 MM\nAXIS X1 = 0\n",
+    "an EasyRoute control": "unit = mm\n[X]\n0, 0.000, 0.010\n",
+    "a screw map of Mach3": "-10.0,-10.001\n0,0\n10,10.002\n",
+    "a compensation value list of ISG": "kopf.log_achs_nr 2\nkw.ssfk.unit 1\n",
+    "a bed mesh of Klipper": "[bed_mesh]\n",
+}
+
+
+@pytest.mark.parametrize("title", NAMED)
+def test_a_file_that_is_not_read_is_named_with_an_alternative(title):
+    with pytest.raises(SceneError, match=f"{title}.*; expected another file: .+"):
+        read(NAMED[title], "x.dat", axis="X")
+
+
+FOREIGN = {
+    "points.xyz": "1 2 3\n4 -5 6\n7 8 9\n",
+    "x.comp": "a screw\n",
+    "m.COM": "BEGIN PGM 1 MM\nL X+1\n",
+    "m.cma": "some text\n",
+    "x.tab": "a,b\n1,2\n",
+    "x.map": "0 1 2\n5 9 1\n",
+    "x.rtl": "HEADER\n",
+    "m.gcode": "G1 X1\n",
+    "m.hal": "loadrt trivkins\n",
+    "printer.cfg": "[stepper_x]\n",
+    "config.g": "M92 X80\n",
+    "v.exc": "1;2\n",
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_a_file_is_not_recognised_by_its_ending(name):
+    with pytest.raises(SceneError, match="matches no known format"):
+        recognise([source_of_text(FOREIGN[name], name)])
+
+
+def test_a_file_is_recognised_under_another_ending():
+    assert recognise([source_of_text("BEGIN X.CMA MM\n", "x.tab")]).name == "heidenhain"
+    assert recognise([source_of_text(COMP["x.comp"], "x.map")]).name == "linuxcnc-comp"
+
+
 def test_linuxcnc_settings_that_are_not_read_are_reported():
     text = COMP["g.ini"].replace("[JOINT_1]", "[JOINT_3]\nBACKLASH = 0.02\n[JOINT_1]")
     sources = [source_of_text(text, "g.ini"), source_of_text(COMP["x.comp"], "x.comp")]
@@ -345,6 +397,12 @@ SHEETS = {
     )).encode(),
     "runs in columns": WIDE.encode(),
     "runs in columns with unit": WIDE.replace("↑", " + [µm]").replace("↓", " - [µm]").encode(),
+    "runs in rows": "\n".join([
+        "Target [mm];" + ";".join(map(str, TARGETS)),
+        *(f"{run} {way};" + ";".join(map(str, values)) for (run, way), values in RUNS.items()),
+    ]).encode(),
+    "blanks": sheet("run direction target_mm deviation [um]").replace(",", "  ").encode(),
+    "headings in German": sheet("Lauf,Richtung,Sollposition [mm],Abweichung [µm]").encode(),
     "preamble": f"Report;laser\nDate;2024-05-01\n\n{WIDE}".encode(),
 }  # fmt: skip
 
@@ -358,6 +416,13 @@ def test_laser_sheets_are_read_alike_by_test_and_import(name, tmp_path):
     (exx,) = read_errors(open_files([path]), ReadOptions(axis="X")).imported.series
     assert exx.in_direction(FORWARD) == pytest.approx([0.35, 1.35, 2.45])
     assert exx.in_direction(BACKWARD) == pytest.approx([-2.25, -1.05, 0.15])
+    if name in ("headings in German", "point names"):  # a scene names its column
+        return
+    runs = read_csv_runs(path, "deviation", "measured.EXX")
+    points = {(run.direction, *point) for run in runs for point in run.points}
+    assert len(points) == len(ROWS)
+    assert sorted({place for _, place, _ in points}) == pytest.approx(TARGETS)
+    assert sorted(value for *_, value in points) == pytest.approx(sorted(row[3] for row in ROWS))
 
 
 @pytest.mark.parametrize(
@@ -375,6 +440,33 @@ def test_laser_sheets_that_are_not_understood_are_refused(text, message, tmp_pat
     path.write_text(text, encoding="utf-8")
     with pytest.raises(SceneError, match=message):
         run_test(scene_with(), find_test("positioning")(axis="X"), path)
+
+
+@pytest.mark.parametrize(
+    ("text", "position"),
+    [
+        ("Position X [mm];Abweichung [µm]\n0;0\n100;1,5\n", 100.0),
+        ("X [mm] EXX [um]\n0 0\n1 1.5", 1.0),
+    ],
+)
+def test_headings_with_blanks_and_in_german(text, position):
+    (exx,) = read(text, "x.csv").series
+    assert (exx.key, exx.positions) == ("EXX", (0.0, position))
+    assert exx.values == pytest.approx([0.0, 1.5])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("Target [mm];0;100\n1↑;0;1\nmean;0;1\n", 'line 3: "mean"; expected a run such as 2 ↑'),
+        ("Target [mm];0;100\n1↑ [mm];0;1\n", 'line 2: "1↑ .mm."; expected a run such as 2 ↑'),
+        ("Target [mm];0;100\n1↑;0;1;2\n", "line 2: 4 fields; expected 3"),
+        ("Target [mm];1↑ [foo];1↓ [foo]\n0;0;1\n", "line 1: .*foo"),
+    ],
+)
+def test_runs_in_rows_that_are_not_understood_are_refused(text, message):
+    with pytest.raises(SceneError, match=message):
+        read(text, "laser.csv", axis="X")
 
 
 def test_a_sheet_without_its_axis_asks_for_it():
@@ -408,6 +500,19 @@ def test_calibration_ignores_columns_that_it_does_not_need():
     assert table.require(("j1_deg", "x_mm"))[0] == pytest.approx([np.rad2deg(1.5), 2.0])
     with pytest.raises(SceneError, match='line 2, pt: "P1"; expected a finite number'):
         table.require(("pt",))
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg", "axis positions only.*closed loop"),
+        ("Timestamp,shoulder_pan_joint,x_mm,y_mm,z_mm", "has no column j1_deg, j2_deg.*shoulder_"),
+    ],
+)
+def test_robot_readings_without_positions_or_joints_are_refused(header, message):
+    row = ",".join("1" for _ in header.split(","))
+    with pytest.raises(SceneError, match=message):
+        parse_readings(f"{header}\n{row}\n", "r.csv", load_scene("ur10"), "positions")
 
 
 def xlsx(rows):

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 import warpspace
 from warpspace.cli.main import cli
 from warpspace.exceptions import OptionError, SceneError
-from warpspace.parts.interpreter import read_program
+from warpspace.parts.gcode.interpreter import read_program
 from warpspace.parts.program import Program, ToolPath, correct_program, trace_program
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
@@ -136,11 +136,13 @@ def test_words_that_do_not_lead_are_kept(dvf: Scene):
         "G500 G0 X0 Y0 Z-200 D0\nZ-150 D1\nG1 X10\nG2 X0 Y-10 I=AC(10) J=AC(-10)\nX-9 Y-1 CR=15",
         "G0 X0 Y0 Z-400\nG56 H1 Z-300\nG1 X30\nG53\nG1 X9 Z-310",
         "G0 X0 Y0 Z-200\nG1 X50 ,R5.\nY50 ,C2.\nX0",
-        "G0 X0 Y0 Z-200\nTRANS X5 Y5\nG1 X9 M777\nX3",
+        "G500 G0 X0 Y0 Z-200\nG1 X50 RND=5\nY50 CHF=2\nX0 CHR=3\nY9",
+        "G0 X0 Y0 Z-200 B0 C0\nD1\nTRAORI\nG1 X5 Y5 Z-190\nX9 B10 C20\nTRAFOOF\nG1 X3 Y5 Z-190",
+        "G0 X0 Y0 Z-200\nSCALE X5 Y5\nG1 X9 M777\nX3",
     ],
 )
 def test_other_words_of_a_corrected_program_mean_the_same(dvf: Scene, text: str):
-    asked = {"length_mm": 60.0, "skip": ("TRANS", "M777")}
+    asked = {"length_mm": 60.0, "skip": ("SCALE", "M777")}
     lines = text.splitlines()
     wanted, found = (trace(dvf, some, **asked) for some in (lines, correct(dvf, lines, **asked)))
     ends, corrected = wanted.tip_mm[is_end(wanted)], actual(found)[is_end(found)]
@@ -153,6 +155,9 @@ def test_other_words_of_a_corrected_program_mean_the_same(dvf: Scene, text: str)
     [(["G0 X1 Y1 Z1", "M98 P1"], "line 2: M98"), (["G0 X1 Y1 Z1", "G1 X9 R2"], "line 2: R2"),
      (["G0 X1 Y1 Z1", "G84 Z-5 R0"], "line 2: G84"), (["G0 X1 Y1 Z1", "G92 X0"], "line 2: G92"),
      (["G0 X1 Y1 Z1", "G68 R5"], "line 2: G68"), (["G91 G1 X1"], "expected G90 and X, Y, Z before"),
+     (["G0 X1 Y1 Z1 C9", "G43.4 H1 X2"], "line 2: G43.4"),
+     (["G0 X1 Y1 Z1 C9", "TRANS X5"], "line 2: TRANS"),
+     (["G0 X1 Y1 Z1 C9", "G68.2 X0 Y0 Z0 I0 J5 K0", "G53.1"], "line 3: G53.1"),
      (["G0 X1 Z1", "G2 X1 I5"], "expected G90 and Y before"),
      (["G90 X1 Y1 Z1", "G55 G91 Z1"], "line 2: moves from a place not known")],
 )  # fmt: skip

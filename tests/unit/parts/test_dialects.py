@@ -29,13 +29,13 @@ START = "G21 G90 G17\nG0 X0 Y0 Z0\nG1 X10 F100\n"
 @pytest.mark.parametrize(
     ("block", "word"),
     [
-        ("TRANS X100 Y50", "TRANS"), ("AROT Z30", "AROT"), ("G101 X0", "G101"),
+        ("SCALE X2", "SCALE"), ("AROT Z30 A5", "A5"), ("G101 X0", "G101"),
         ("G7.1 C50", "G7.1"), ("M777 X500 Y500", "M777"), ("G68.1 R45", "G68.1"),
-        ("G71 I30 J0 K30 L4", "G71"), ("G50.1 X0", "G50.1"), ("G50 X3", "G50"),
-        ("G254", "G254"), ("CYCLE800(1,\"TC1\",0)", "CYCLE800"), ("MCALL CYCLE83(1)", "MCALL"),
+        ("G71 I30 J0 K30 L4", "G71"), ("G51 X0", "G51"), ("G50 X3", "G50"),
+        ("M128", "M128"), ("CYCLE800(1,\"TC1\",0)", "CYCLE800"), ("MCALL CYCLE83(1)", "MCALL"),
         ("G1 X50 ,B5.", ",B5."), ("G1 X50 A5", "A5"), ("G58 X10 Y20", "G58"), ("R1=5", "R1=5"),
         ("G83 Z-5. R1.", "G83"), ("G83 Z-5. R1. Q0.", "G83"), ("G83 Z-5 R1 Q1 K0.2", "K0.2"),
-        ("ROT RPL=45", "ROT"), ("M98 P7", "M98 P7"), ("G41 D1 X9", "G41"), ("X=R1", "X=R1"),
+        ("ROT X4 RPL=45", "ROT"), ("M98 P7", "M98 P7"), ("G41 D1 X9", "G41"), ("X=R1", "X=R1"),
     ],
 )  # fmt: skip
 def test_the_path_ends_before_a_word_that_is_not_known(tmp_path: Path, block: str, word: str):
@@ -52,7 +52,7 @@ def test_the_path_ends_before_a_word_that_is_not_known(tmp_path: Path, block: st
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("TRANS X5 Y5\nG0 X1", r"line 1: TRANS; expected"), ("M8\nM30", "moves no axis"),
+        ("SCALE X5 Y5\nG0 X1", r"line 1: SCALE; expected"), ("M8\nM30", "moves no axis"),
         ("BEGIN PGM 11 MM\n1 L X5 F9", "line 1: BEGIN PGM; HEIDENHAIN Klartext"),
         ("%\n(2D (2))\nG0 X5", r"line 2: \(2D; expected the end of the comment"),
     ],
@@ -73,8 +73,8 @@ def test_words_to_skip_are_ignored_and_stated():
     }
     assert (result.length_mm, result.program.refused) == (pytest.approx(20.0), {})
     assert {"line": 4, "words": "TRANS X100 Y50"} in result.as_json()["skipped"]
-    assert any("TRANS X100 Y50 (line 4)" in caveat for caveat in result.caveats())
-    assert any("TRANS X100 Y50" in str(block) for block in result.blocks())
+    stated = [*map(str, result.blocks()), *result.caveats()]
+    assert sum("TRANS X100 Y50 (line 4)" in text for text in stated) == 1
 
 
 @pytest.mark.parametrize(
@@ -128,12 +128,91 @@ def test_a_printer_executes_the_file_of_a_slicer(text: str, length: float):
          "G90\nM99"), {}, 24 + math.sqrt(216) + 48),
         ("G0 X0 Y0 Z0\nM98 P30012\nM30\nO12\nG91 X1\nG90\nM99", {}, 3.0),
         ("G0 X0 Y0 Z0\nM97 P5 L2\nM30\nN5 G91 X1\nM99", {}, 2.0),
+        (("o100 sub\nG91 X1 (one)\nG90\no100 endsub\nG0 X0 Y0 Z0\no100 call\no2 repeat [3]\n"
+          "o100 call\no2 endrepeat (thrice)\no3 repeat [0]\nX99\no3 endrepeat\nM2"), {}, 4.0),
+        ("o<side> sub\nG1 X10\no<side> endsub\nG0 X0 Y0 Z0\no<side> call\nM2", {}, 10.0),
+        # corners of SINUMERIK: radius, leg and length of a chamfer
+        ("G0 X0 Y0 Z0 SUPA\nG1 X50 RND=5\nY50 CHR=2\nX0 CHF=2\nY0", {},
+         45 + 2.5 * math.pi + 43 + 8**0.5 + 48 - 2**0.5 + 2 + 50 - 2**0.5),
     ],
 )  # fmt: skip
 def test_common_constructs(text: str, offset: dict[str, float], length: float):
     result = run(text, offset=tuple(offset.items()))
     assert result.program.refused == {}
     assert result.length_mm == pytest.approx(length, abs=2e-3)
+
+
+G18 = """G90 G17 G20
+G0 X0.5228 Y-0.1828
+Z0.2
+Z0.05
+G1 Z-0.0375 F8
+G18 G3 X0.4853 Z-0.075 I-0.0375
+G1 X0.3125
+X0.1625
+G17 G2 Y0.0852 J0.134
+G1 X0.3125
+G2 Y-0.1828 J-0.134
+G1 X-0.1625
+X-0.3125
+G2 Y0.0852 J0.134
+G1 X-0.1625
+G18 G2 X-0.125 Z-0.0375 K0.0375
+G0 Z0.2"""
+DRAG_KNIFE = """G0 X0 Y0 Z.8
+G0 X6.0004 Y9.2749
+G1 Z-0.05
+G3 X7.4141 Y9.2740 R1
+G1 X10.0048 Y6.6781
+G2 X8.5911 Y6.6790 R1
+G1 X9.7718 Y9.7373
+G3 X8.3572 Y8.3234 R1
+G0 Z.8"""
+G81 = """g98 g90 g20 f10
+{}
+g81 {}1 {}1 {}-1 r1
+g81 {}1 {}2 {}0.5 r3
+g81 {}1 {}3 {}4 r5
+m2"""
+
+
+def half_circles(*blocks: str) -> str:
+    return "G0 X34.8831 Y-4.3512 Z0\n" + "\n".join(blocks)
+
+
+@pytest.mark.parametrize(
+    ("text", "length"),
+    [
+        # arcs in G18; values of the threads, and closed forms
+        (G18, 78.8284),
+        (DRAG_KNIFE, 25.974),
+        ("G17 G0 X10 Y10 Z0\nG02 X20 Y0 R-10", 15 * math.pi),
+        (half_circles("G1 Z-0.1", "G03 X36.8831 Y-4.3512 R1", "G03 X34.8831 Y-4.3512 R1"),
+         0.1 + 2 * math.pi),
+        ("G0 X0 Y0 Z0\nG3 X41.089 Y-28.164 I20.5445 J-14.082\nX0 Y0 I-20.5445 J14.082",
+         math.tau * math.hypot(20.5445, 14.082)),
+        ("G0 X30 Y0 Z0\nG2 I-30.", 60 * math.pi),
+        # cycles of LinuxCNC in two planes
+        (G81.format("g17 g0 x0 y0 z2", *"xyz" * 3), 493.1210),
+        (G81.format("g19 g0 x2 y0 z0", *"yzx" * 3), 493.1210),
+        # the circle of circle, diamond and square
+        (("g90 g20\nG0 X2 Y0.375 Z2.1\nG1 Z1.6875\nG2 X0.375 Y2 R1.625\nG2 X2 Y3.625 R1.625\n"
+          "G2 X3.625 Y2 R1.625\nG2 X2 Y0.375 R1.625\nG1 Z2.1"), 25.4 * (3.25 * math.pi + 0.825)),
+    ],
+)  # fmt: skip
+def test_lengths_of_arcs_and_cycles(text: str, length: float):
+    result = run(text)
+    assert result.program.refused == {}
+    assert result.length_mm == pytest.approx(length, abs=2e-3)
+
+
+def test_shifts_of_the_programs_of_controls():
+    """Words of an unshifted program, and those after a shift, lead to the same path."""
+    shifted = "G17 G90 G54\nG0 X0 Y0 Z10\nTRANS X100 Y50\nG1 X0 Y0 Z0 F300\nX10\nTRANS\nG0 Z10"
+    reference = "G17 G90 G54\nG0 X0 Y0 Z10\nG1 X100 Y50 Z0 F300\nG1 X110\nG0 Z10"
+    assert run(shifted).length_mm == pytest.approx(run(reference).length_mm)
+    unnamed = run(shifted.replace("G1 X0 Y0 Z0", "G1 Z0"))
+    assert unnamed.program.refused == {4: "G1"}
 
 
 def test_the_path_of_a_haas_deep_hole_without_q():
@@ -173,11 +252,12 @@ def test_assumptions_are_stated(text: str, options: Any, caveat: str):
     assert any(caveat in remark for remark in run(text, **options).as_json()["remarks"])
 
 
-def test_the_frame_of_a_turned_table_is_stated():
-    result = run("G0 X0 Y0 Z0 A0 C90.\nG43.4 H1 Z-100.\nX50.", AC, offset=(("H1", 100.0),))
-    assert any(
-        "G43.4 at C90: workpiece frame at rotary zero" in caveat for caveat in result.caveats()
-    )
+@pytest.mark.parametrize("frame", ["present", "zero"])
+def test_the_frame_of_a_turned_table_is_stated(frame: Any):
+    text = "G0 X0 Y0 Z0 A0 C90.\nG43.4 H1 Z-100.\nX50."
+    result = run(text, AC, offset=(("H1", 100.0),), tcp_frame=frame)
+    stated = "as it stands" if frame == "present" else "at rotary zero"
+    assert any(f"G43.4 at C90: workpiece frame {stated}" in remark for remark in result.caveats())
 
 
 def test_the_least_increment_scales_numbers_without_a_point():
@@ -205,7 +285,7 @@ def test_the_command_line_reads_dialect_and_words_to_skip(tmp_path: Path):
     arguments = ["program", MILL, str(tmp_path / "a.nc")]
     skip = ["--skip", "TRANS,M777", "--dialect", "sinumerik"]
     text = CliRunner().invoke(cli, [*arguments, *skip]).output
-    assert "Ignored because of --skip: TRANS X100 Y50" in text
+    assert "Ignored because of --skip: TRANS X100 Y50 (line 4)" in text
     assert "3 blocks, 20.0 mm" in text
     assert (
         "is not one of 'auto', 'fanuc'"

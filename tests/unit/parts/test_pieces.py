@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import warpspace
-from warpspace.parts.interpreter import ControlSettings, read_program
+from warpspace.parts.gcode.control_settings import ControlSettings
+from warpspace.parts.gcode.interpreter import read_program
 from warpspace.parts.program import trace_program
 from warpspace.parts.sample_pieces import ON_RING, PIECES, build_piece
 from warpspace.parts.workpiece import load_workpiece

@@ -14,13 +14,9 @@ from products import first
 from warpspace.analysis.registry import verb
 from warpspace.bench.kinds.circular import Circular
 from warpspace.exceptions import OptionError, SceneError
-from warpspace.parts.interpreter import (
-    STAND,
-    ControlSettings,
-    ParsedProgram,
-    read_program,
-    with_length,
-)
+from warpspace.parts.gcode.control_settings import ControlSettings
+from warpspace.parts.gcode.interpreter import read_program
+from warpspace.parts.gcode.parsed import STAND, ParsedProgram, with_length
 from warpspace.parts.program import Program, ToolPath, trace_program
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene, evaluate
@@ -202,7 +198,9 @@ def test_json_holds_together(dvf: Scene, tmp_path: Path):
 @pytest.mark.parametrize(
     ("text", "word"),
     [("#1=5", "#1=5"), ("G1 X[1+2]", "X[1+2]"), ("X#3", "X#3"), ("M98 P100", "M98 P100"),
-     ("G41 D1 X5", "G41"), ("O100 sub", "O100"), ("IF [#1 GT 2] GOTO 5", "IF"),
+     ("G41 D1 X5", "G41"), ("O100 sub", "O100 SUB"),
+     ("O100 call [5]", "O100 CALL"), ("O1 endsub", "O1 ENDSUB"), ("O1 if [1]", "O1"),
+     ("IF [#1 GT 2] GOTO 5", "IF"),
      ("G05.1 X5", "G5.1"), ("M198 P5", "M198"),
      *((f"G{g} X5", f"G{g}") for g in (27, 29, 31, 34, 37, 47, 70, 110, 129, 150, 154))],
 )  # fmt: skip

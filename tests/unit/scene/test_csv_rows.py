@@ -2,6 +2,7 @@
 
 import io
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -103,3 +104,31 @@ def test_a_text_that_a_spreadsheet_may_run_is_guarded(sign):
     text = f"{sign}HYPERLINK(1)"
     assert spell_row([text]) == f"'{text}\n"
     assert unguard_cell(guard_cell(text)) == text
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"),
+    [("urad", 1.0), ("mm/m", 1e3), ("µm/m", 1.0), ('"', np.pi / 648e-3), ("°", 1e6 * np.pi / 180)],
+)
+def test_angles_of_a_scene_in_any_unit(unit, factor, tmp_path):
+    path = tmp_path / "x.csv"
+    path.write_text(f"X [in];EAX [{unit}]\n0;0\n1;2\n", encoding="utf-8")
+    points = read_csv_column(path, "EAX", "errors.EAX")
+    assert np.array(points) == pytest.approx(np.array([[0.0, 0.0], [25.4, 2.0 * factor]]))
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("X [mm],EAX [mm]", r"column 'EAX \[mm\]'; expected a unit such as urad"),
+        ("X [deg],EAX [urad]", r"column 'X \[deg\]'; expected a unit such as mm"),
+        ("X [mm],EAX [furlong]", "column 'EAX' not found|expected a unit"),
+    ],
+)
+def test_units_of_another_quantity_are_refused(header, message, tmp_path):
+    path = tmp_path / "x.csv"
+    path.write_text(f"{header}\n0,0\n1,2\n", encoding="utf-8")
+    with pytest.raises(SceneError, match=message):
+        read_csv_column(path, "EAX", "errors.EAX")
+    with pytest.raises(SceneError, match="expected a unit"):
+        read_csv_column(path, header.split(",")[1], "errors.EAX")

@@ -360,10 +360,14 @@ class FieldUncertainty:
         """Weight of |E| of each point in mean, RMS, P95 and max, [4, N]."""
         norm, weights = self.norm_um.reshape(-1), self.weights
         order = np.argsort(norm)
-        place = np.cumsum(weights[order])
+        place = np.cumsum(weights[order]) - weights[order] / 2.0
         near, largest = np.zeros((2, norm.size))
-        chosen = order[np.abs(place - P95) <= max(NEAR, 1.5 / norm.size)]
-        near[chosen] = weights[chosen] / max(weights[chosen].sum(), 1e-300)
+        away = np.abs(place - P95)
+        chosen = order[away <= max(NEAR, 1.5 / norm.size, away.min())]
+        # errors that grow by 1 % make P95 grow by 1 %, however few points are near
+        p95, mean = np.interp(P95, place, norm[order]), weights[chosen] @ norm[chosen]
+        scale = p95 / mean if mean else 1.0 / max(weights[chosen].sum(), 1e-300)
+        near[chosen] = weights[chosen] * scale
         largest[np.argmax(norm if norm.any() else self.u95_norm_um)] = 1.0
         rms = float(np.sqrt(weights @ norm**2))
         return np.stack([weights, weights * norm / rms if rms else weights, near, largest])

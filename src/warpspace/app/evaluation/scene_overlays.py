@@ -22,7 +22,7 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.parts import workpiece
-from warpspace.parts.interpreter import read_program
+from warpspace.parts.gcode.interpreter import read_program
 from warpspace.parts.program import Program, ToolPath, trace_program
 from warpspace.parts.workpiece import ActualPoints, Workpiece
 from warpspace.scene.model import Scene

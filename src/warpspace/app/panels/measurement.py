@@ -16,7 +16,7 @@ from warpspace.app.browser.html import EMPTY, button, choice, join, number, tag
 from warpspace.app.browser.html import field as labelled
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
-from warpspace.app.documents.transfers import read_upload, upload_text
+from warpspace.app.documents.transfers import read_upload
 from warpspace.app.drawing.around import residuals
 from warpspace.app.drawing.shapes import Nodes, Shapes
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -35,6 +35,7 @@ from warpspace.calibration.readings import bundled_data, find_data, parse_readin
 from warpspace.calibration.registry import KINDS, parse_readings
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
+from warpspace.scene.text_files import decode_text
 from warpspace.units import UM_PER_MM, Array
 
 MOST_BYTES = 2 * 2**20  # of a file of readings
@@ -195,7 +196,7 @@ class TestsPanel(FilesPanel):
         return super().handle(state, action, value)
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
-        return partial(self.set_files, (UploadedFile(name, upload_text(content, name, WHAT)),))
+        return partial(self.set_files, (UploadedFile(name, decode_text(content, name)[0]),))
 
 
 # --- Calibration ----------------------------------------------------------------------------------
@@ -320,7 +321,7 @@ class CalibratePanel(FilesPanel):
         return state
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
-        text = upload_text(content, name, WHAT)
+        text, _ = decode_text(content, name)
         scene, kind, files = self.context.state.active_scene(), self._next_kind, self.files
         uploaded = read_uploaded(scene, text, name, kind or None, files)
         return partial(self.set_files, (*files, uploaded))

@@ -37,6 +37,7 @@ from warpspace.machine.axes import is_linear, parameter
 from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
 from warpspace.parts.workpiece import load_workpiece, place_workpiece
 from warpspace.scene.model import Scene
+from warpspace.scene.text_files import decode_text
 from warpspace.units import Array
 
 NAME = "import"
@@ -394,4 +395,4 @@ class ProgramPanel(SceneOverlayPanel):
         return block_html(narrow) + details_html((*tables, worst))
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
-        return partial(self.show, content.decode("utf-8-sig", "replace"), name)
+        return partial(self.show, decode_text(content, name, "replace")[0], name)

@@ -30,7 +30,7 @@ from warpspace.machine.definition import Vector
 from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, ToleranceSet
 from warpspace.machine.limits import EXAGGERATION as FACTORS
 from warpspace.machine.limits import LIVE_NODES, MAX_ERROR, MAX_LENGTH_MM, PROBABILITY
-from warpspace.parts.interpreter import program_lines
+from warpspace.parts.gcode.interpreter import program_lines
 from warpspace.parts.workpiece import Workpiece, load_workpiece
 from warpspace.scene.model import Scene
 from warpspace.scene.notes import Note, NoteAnchor

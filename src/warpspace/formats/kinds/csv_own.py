@@ -15,19 +15,16 @@ from warpspace.formats.registry import Files, Format, ReadOptions, describe
 from warpspace.formats.source import (
     DEG_PER,
     MM_PER,
-    UM_PER,
-    URAD_PER,
     Source,
     SourceLine,
     format_number,
     quote,
     source_of_text,
-    unit_list,
 )
 from warpspace.machine.axes import PARAMETERS, is_axis_name, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
 from warpspace.scene import text_files
-from warpspace.scene.text_files import CsvRows, unguard_cell
+from warpspace.scene.text_files import ANGLE_URAD, LENGTH_UM, CsvRows, unguard_cell
 from warpspace.units import Array
 
 RUN, DIRECTION = "run", "direction"
@@ -123,6 +120,9 @@ _HEADING = re.compile(
     r"(?:(u)\s*\(\s*)?([A-Za-z0-9]+)\s*\)?\s*"
     r"(?:\[\s*([^\]]+?)\s*\]|\(\s*([^)]+?)\s*\)|_([A-Za-zµμ°/]+))?"
 )
+_AXIS_POSITION = re.compile(
+    r"^(?:target|position|sollposition|zielposition)\s+(?=[XYZABCUVW]\s*[\[(_])", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True)
@@ -176,10 +176,15 @@ def recognise(head: str, name: str) -> bool:
         rows = source_of_text(head, name).rows(1)
     except SceneError:
         return False
-    matches = [match for match in map(_heading, rows.header) if match]
+    matches = [match for match in map(_heading, map(_plain, rows.header)) if match]
     has_unit = any(match[3] or match[4] or match[5] for match in matches)
     names = {match[2].upper() for match in matches}
     return has_unit and bool(rows.runs or "DEVIATION" in names or names & PARAMETERS.keys())
+
+
+def _plain(heading: str) -> str:
+    """Translate a heading; ``Position X [mm]`` is the position ``X [mm]``."""
+    return _AXIS_POSITION.sub("", text_files.translate_heading(heading))
 
 
 def _heading(text: str) -> re.Match[str] | None:
@@ -189,8 +194,12 @@ def _heading(text: str) -> re.Match[str] | None:
 def _columns(at: SourceLine, rows: CsvRows, options: ReadOptions) -> tuple[_CsvColumn, ...]:
     headings = [
         f"{heading} [um]" if rows.runs and heading == text_files.DEVIATION else heading
-        for heading in rows.header
+        for heading in map(_plain, rows.header)
     ]
+    names = [match[2].upper() for match in map(_heading, headings) if match]
+    axes = [name for name in names if is_axis_name(name)]
+    if not options.axis and len(axes) == 1:
+        options = replace(options, axis=axes[0])
     columns = [_column(at, heading, options) for heading in headings]
     keys = [(column.role, column.name) for column in columns if column.role != IGNORED]
     repeated = next((name for role, name in keys if keys.count((role, name)) > 1), None)
@@ -218,7 +227,7 @@ def _column(at: SourceLine, heading: str, options: ReadOptions) -> _CsvColumn:
         name = axis if GENERIC[name] == POSITION else f"E{along}{axis}"
     unit = (matched[3] or matched[4] or matched[5] or "").strip()
     if name in PARAMETERS:
-        factors = URAD_PER if parameter(name).is_rotation else UM_PER
+        factors = ANGLE_URAD if parameter(name).is_rotation else LENGTH_UM
         role = UNCERTAINTY if uncertain else ERROR
     elif is_axis_name(name) and not uncertain:
         factors, role = MM_PER if is_linear(name) else DEG_PER, POSITION
@@ -228,8 +237,8 @@ def _column(at: SourceLine, heading: str, options: ReadOptions) -> _CsvColumn:
         expected = f"an axis, an error, u(error), run or direction{hint}"
         at.refuse(f"column {quote(heading)}", expected)
     if not unit:
-        units = unit_list(factors)
-        at.refuse(f"column {name} has no unit", f"{name} [unit], with one of {units}")
+        expected = f"{name} [unit], with one of {', '.join(factors)}"
+        at.refuse(f"column {name} has no unit", expected)
     return _CsvColumn(role, name, at.unit(unit, factors, name), unit)
 
 

@@ -5,6 +5,7 @@ HEIDENHAIN Technical Manual MANUALplus 620, pages 713 to 718, and TNC 407/415/42
 linear between them; `axis of the column in the .COM = F(axis of the column in the .CMA)`.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
@@ -34,10 +35,9 @@ Cells = dict[str, str]
 Columns = dict[str, list[str]]
 
 
-def recognise(head: str, name: str) -> bool:
-    if name.upper().endswith((".COM", ".CMA")) and "BEGIN" in head.upper():
-        return True
-    return POSITION in head.upper().split()
+def recognise(head: str, _name: str) -> bool:
+    is_table = re.match(r"\s*BEGIN\s+\S+\.(?:COM|CMA)\b", head, re.IGNORECASE)
+    return is_table is not None or POSITION in head.upper().split()
 
 
 def _rows(source: Source) -> list[tuple[SourceLine, Cells]]:

@@ -19,7 +19,14 @@ import numpy as np
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
 from warpspace.formats.measured import ImportedErrors
 from warpspace.formats.registry import Files, Format, ReadOptions, describe, has_pattern
-from warpspace.formats.source import Source, format_comment, format_number, quote
+from warpspace.formats.source import (
+    Source,
+    SourceLine,
+    format_comment,
+    format_number,
+    quote,
+    unread_notes,
+)
 from warpspace.formats.terms import Affine, AxisTable, Tables, errors_from_tables
 from warpspace.kinematics.chain import loop_error, nominal_point
 from warpspace.kinematics.model import Loop, Model
@@ -51,7 +58,22 @@ def _is_comp(head: str, name: str) -> bool:
     rows = [line for line in head.splitlines() if line.strip()]
     if name.lower().endswith(".comp"):
         return any(map(_ROW.match, rows))
-    return len(rows) > 1 and all(map(_ROW.match, rows))
+    matches = [match for match in map(_ROW.match, rows) if match]
+    if len(matches) < max(len(rows), 2):
+        return False
+    numbers = np.array([match.groups()[:3] for match in matches], float)
+    return any(_nearness(numbers)) and bool(np.all(np.diff(numbers[:, 0]) > 0.0))
+
+
+def _nearness(rows: np.ndarray) -> tuple[bool, bool]:
+    """Return true for actual positions, near the nominal ones; and for corrections, near zero."""
+    limit = NEAR * max(np.ptp(rows[:, 0]), abs(rows[:, 0]).max(), 1e-9)
+    follows = np.abs(rows[:, 1:] - rows[:, :1]).max() < limit
+    return bool(follows), bool(np.abs(rows[:, 1:]).max() <= limit)
+
+
+_READ_SECTIONS = ("[TRAJ]", "[KINS]", "[END]")
+_READ_KEYS = ("LINEAR_UNITS", "KINEMATICS", "COORDINATES")
 
 
 def _read_ini(source: Source, notes: list[str]) -> dict[str, Joint]:
@@ -61,6 +83,7 @@ def _read_ini(source: Source, notes: list[str]) -> dict[str, Joint]:
     axes = coordinates[1].upper() if coordinates else JOINTS
     per_unit = INCH_MM if _INCH.search(source.text) else 1.0
     axis, file, kind = "", "", POSITIONS
+    is_read, unread = True, list[SourceLine]()
     for at, bare in replace(source, lines=(*source.lines, "[END]")).scan("#", ";"):
         key, _, setting = (part.strip() for part in bare.partition("="))
         if bare.startswith("["):
@@ -71,12 +94,18 @@ def _read_ini(source: Source, notes: list[str]) -> dict[str, Joint]:
                 if int(section[1]) >= len(axes):
                     at.refuse(f"section {bare}", f"a joint from 0 to {len(axes) - 1}, {axes}")
                 axis = axes[int(section[1])]
+            is_read = section is not None or bare in _READ_SECTIONS
+            if not is_read:
+                unread.append(at)
         elif key == "COMP_FILE":
             file = setting.rsplit("/", 1)[-1]
         elif key == "COMP_FILE_TYPE":
             kind = f"type-{at.integer(setting, key, 0, 1)}"
         elif key == "BACKLASH" and axis:
             notes.append(f"{source.base}: line {at.line}: ignored {bare}: not in a COMP_FILE")
+        elif is_read and key not in _READ_KEYS:
+            unread.append(at)
+    notes += unread_notes(unread)
     return joints
 
 
@@ -88,12 +117,8 @@ def _rows(source: Source, per_unit: float, notes: list[str]) -> np.ndarray:
             if not rows:
                 problem = f"LinuxCNC stops here, at {at.quoted}, without a table"
                 at.refuse(problem, "three numbers: nominal forward reverse")
-            unread = sum(map(bool, map(_ROW.match, source.lines[number:])))
-            if unread:
-                notes.append(
-                    f"{source.name}: LinuxCNC stops at line {number}, {at.quoted}: ignored"
-                    f" {unread} rows after it"
-                )
+            unread = [at for at, _ in source.scan() if at.line >= number]
+            notes += [f"{note}: LinuxCNC stops at line {number}" for note in unread_notes(unread)]
             break
         if match[4].strip():
             notes.append(
@@ -110,9 +135,7 @@ def _rows(source: Source, per_unit: float, notes: list[str]) -> np.ndarray:
 
 
 def _kind(source: Source, rows: np.ndarray, stated: str) -> tuple[str, tuple[str, ...]]:
-    span = max(np.ptp(rows[:, 0]), abs(rows[:, 0]).max(), 1e-9)
-    follows = np.abs(rows[:, 1:] - rows[:, :1]).max() < NEAR * span
-    stays = np.abs(rows[:, 1:]).max() <= NEAR * span
+    follows, stays = _nearness(rows)
     if (stated == OFFSETS and follows and not stays) or (
         stated == POSITIONS and stays and not follows
     ):
@@ -121,7 +144,7 @@ def _kind(source: Source, rows: np.ndarray, stated: str) -> tuple[str, tuple[str
         source.refuse(f"looks like {contents}, but is {stated}", f"{stated} (is it {other}?)")
     if stated:
         return stated, ()
-    kind = POSITIONS if follows and np.abs(rows[:, 1]).max() > NEAR * span else OFFSETS
+    kind = POSITIONS if follows and not stays else OFFSETS
     description = "actual positions (type 0)" if kind == POSITIONS else "offsets (type 1)"
     return kind, (f"second and third column: {description}; --variant selects the other type",)
 
@@ -258,9 +281,12 @@ def squareness(first_diagonal_mm: float, second_diagonal_mm: float) -> float:
 
 def _read_matrix(sources: Sequence[Source], options: ReadOptions) -> Tables:
     coefficients: dict[tuple[str, str], float] = {}
+    notes: list[str] = []
     for source in sources:
+        unread: list[SourceLine] = []
         for at, bare in source.scan("#"):
             if not re.search(r"\bC_[a-z]", bare, re.IGNORECASE):
+                unread.append(at)
                 continue
             matched = _SETP.fullmatch(bare)
             if matched is None:
@@ -276,8 +302,9 @@ def _read_matrix(sources: Sequence[Source], options: ReadOptions) -> Tables:
             coefficients[row, column] = value
         if not coefficients:
             source.refuse("sets no coefficient", "setp matrixkins.C_xx … C_zz")
+        notes += unread_notes(unread)
     matrix = tuple(tuple(coefficients.get((row, axis), 0.0) for axis in AXES) for row in AXES)
-    return Tables((Affine(AXES, matrix),), (), (), ("mm/mm",))
+    return Tables((Affine(AXES, matrix),), (), tuple(notes), ("mm/mm",))
 
 
 def _read_matrix_errors(sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:

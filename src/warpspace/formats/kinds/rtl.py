@@ -12,7 +12,7 @@ import numpy as np
 
 from warpspace.formats import measured
 from warpspace.formats.registry import Format, ReadOptions, describe, has_pattern
-from warpspace.formats.source import Source, SourceLine
+from warpspace.formats.source import Source, SourceLine, unread_notes
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
 
@@ -86,15 +86,18 @@ def _targets(source: Source, lines: Lines) -> tuple[list[float], list[int]]:
     return values, flags
 
 
-def _run_count(source: Source, lines: Lines) -> int:
-    stated = 0
+def _run_count(source: Source, lines: Lines) -> tuple[int, tuple[str, ...]]:
+    """Return the count of runs, and notes on what else is in their section."""
+    stated, unread = 0, list[SourceLine]()
     for at, text in lines:
         key, value = _pair(text) or ("", "")
         if key == "run-count":
             stated = at.integer(value, "Run-count", 1, MAX_RUNS)
+        else:
+            unread.append(at)
     if not stated:
         source.refuse("section RUNS has no Run-count", "Run-count: number")
-    return stated
+    return stated, unread_notes(unread)
 
 
 def _deviations(lines: Lines, targets: int, stated: int) -> dict[int, np.ndarray]:
@@ -124,7 +127,7 @@ def _deviations(lines: Lines, targets: int, stated: int) -> dict[int, np.ndarray
 def _read_one(source: Source, options: ReadOptions) -> measured.ImportedErrors:
     sections = _sections(source)
     targets, flags = _targets(source, sections["TARGET DATA"])
-    stated = _run_count(source, sections["RUNS"])
+    stated, unread = _run_count(source, sections["RUNS"])
     unidirectional = len(flags) > 1 and flags[1] == 1
     if options.axis:
         axis = options.axis_named(options.axis, source)
@@ -156,7 +159,8 @@ def _read_one(source: Source, options: ReadOptions) -> measured.ImportedErrors:
     key = f"E{'XYZ'['XYZUVW'.index(axis[0]) % 3]}{axis}"
     series = measured.ErrorSeries(key, tuple(float(targets[index]) for index in order), runs)
     air = [text for _, text in sections.get("ENVIRONMENT", [])]
-    notes = source.notes
+    header = [at for at, text in sections.get("HEADER", []) if _pair(text) is None]
+    notes = (*source.notes, *unread_notes(header), *unread)
     if air:
         notes += (f"environment: {'; '.join(air)}",)
     assumed = (INFERRED, ONE_WAY) if unidirectional else (INFERRED,)

@@ -21,7 +21,7 @@ import numpy as np
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
 from warpspace.formats.measured import ErrorSeries, ImportedErrors, errors_of_readings, merge
 from warpspace.formats.registry import Files, Format, ReadOptions, describe, has_pattern
-from warpspace.formats.source import Source, SourceLine, format_comment, format_number
+from warpspace.formats.source import Source, SourceLine, format_comment, format_number, unread_notes
 from warpspace.formats.terms import Affine, Tables, errors_from_tables
 from warpspace.units import URAD_PER_RAD
 
@@ -94,6 +94,9 @@ _TWIST_KEY = re.compile(
     r"|horizontal_move_z"
 )
 _SAVED_KEY = re.compile(r"(xy|xz|yz)_skew")
+_COMMAND = re.compile(r"SET_SKEW|SKEW_PROFILE")
+READ_SECTIONS = (TWIST, "skew_correction", "bed_mesh", "gcode_macro")
+OFFSETS = {"x_offset", "y_offset"}
 _SET = re.compile(r"\b(XY|XZ|YZ)=([^\s]+)")
 _PROFILE = re.compile(r"\[skew_correction\s++([^\]]+)\]")
 _LOAD = re.compile(r"\bSKEW_PROFILE\s+LOAD=\"?([^\s\"]+)")
@@ -192,6 +195,8 @@ def _twist(source: Source, options: ReadOptions) -> ImportedErrors | None:
             continue
         at, text = twist[heights_key]
         options.axis_named(axis.upper(), at)
+        if len({*re.findall(r",\s*", text)}) > 1:
+            at.refuse(f"{heights_key} {text}", "numbers with a point, all separated alike")
         heights = [at.number(part, heights_key) for part in text.split(",")]
         ends = [_twist_end(twist, f"{end}_{axis}", at) for end in ("start", "end")]
         if len(heights) < 2 or ends[1] <= ends[0]:
@@ -247,6 +252,18 @@ def _unread(source: Source) -> tuple[str, ...]:
         f"{source.base}: ignored [bed_mesh]: the shape of the bed, not an error of an axis"
         for _ in sections.keys() & {"bed_mesh"}
     ]
+    unread_lines: list[SourceLine] = []
+    is_outside = True
+    for at, bare in source.scan(";"):
+        heading = _SECTION.fullmatch(bare.removeprefix("#*#").strip())
+        is_outside = is_outside and heading is None
+        if heading:
+            is_read = heading[1] in READ_SECTIONS or OFFSETS & sections[heading[1]].keys()
+        else:
+            is_read = not is_outside or bare.startswith("#") or _COMMAND.search(bare)
+        if not is_read:
+            unread_lines.append(at)
+    notes += unread_notes(unread_lines)
     for name, expression in ((TWIST, _TWIST_KEY), ("skew_correction", _SAVED_KEY)):
         unread = [key for key in sections.get(name, {}) if not expression.fullmatch(key)]
         if unread:
@@ -283,6 +300,8 @@ _WORD = re.compile(r"([A-Z])\s*([^A-Z\s]*)")
 _DEFINE = re.compile(r"#\s*define\s+(XY|XZ|YZ)_(DIAG_AC|DIAG_BD|SIDE_AD|SKEW_FACTOR)\s+(\S+)")
 _SWITCH = re.compile(r"#\s*define\s+(SKEW_CORRECTION(?:_FOR_Z)?)\b")
 _ECHO = re.compile(r"^(Recv:\s*+)?echo:\s*+")
+_IDLE = re.compile(r"#\s*(?:if|ifdef|endif|else)\b|> ?M852$|(?:Recv: *)?ok$|echo:;")
+"""Lines around skew factors that state nothing."""
 _REPORTED = re.compile(r"\b(XY|XZ|YZ):\s*([^\s,]+)")
 _COMMENT = re.compile(r"/\*.*?(?:\*/|$)|//[^\n]*", re.DOTALL)
 
@@ -301,7 +320,7 @@ def _marlin_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     defined: dict[str, Settings] = {}
     notes: list[str] = []
     for source in sources:
-        switches = _read_marlin(source, factors, defined)
+        switches = _read_marlin(source, factors, defined, notes)
         if defined and "SKEW_CORRECTION" not in switches:
             at, _ = next(iter(next(iter(defined.values())).values()))
             expected = "#define SKEW_CORRECTION, not commented out"
@@ -323,9 +342,12 @@ def _marlin_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     return Tables((skew,), (), tuple(notes), ("mm", "rad"))
 
 
-def _read_marlin(source: Source, factors: Settings, defined: dict[str, Settings]) -> set[str]:
+def _read_marlin(
+    source: Source, factors: Settings, defined: dict[str, Settings], notes: list[str]
+) -> set[str]:
     """Read the factors of M852 and the lengths by plane; return the switches that are defined."""
     switches: set[str] = set()
+    unread: list[SourceLine] = []
     text = _COMMENT.sub(lambda comment: "\n" * comment[0].count("\n"), source.text)
     for at, line in replace(source, lines=tuple(text.split("\n"))).scan(";"):
         bare = _ECHO.sub("", line)
@@ -354,6 +376,9 @@ def _read_marlin(source: Source, factors: Settings, defined: dict[str, Settings]
                 if planes.count(plane) > 1:
                     at.refuse(f"M852 sets {plane} twice", "it once")
                 factors[plane] = (at, at.number(number, f"M852 {letter}"))
+        elif not _IDLE.match(line):
+            unread.append(at)
+    notes += unread_notes(unread)
     return switches
 
 
@@ -397,12 +422,15 @@ def _read_m556(sources: Sequence[Source], options: ReadOptions) -> Tables:
     """Read M556 of RepRapFirmware, Move::AxisTransform: X += tan XY·Y + tan XZ·Z."""
     matrix = np.zeros((3, 3))
     is_empty = True
+    notes: list[str] = []
     for source in sources:
+        unread: list[SourceLine] = []
         for at, bare in source.scan(";"):
             command = _M556.fullmatch(bare)
             parameters = _WORD.findall(command[1].upper()) if command else []
             numbers = {letter: at.number(text, f"M556 {letter}") for letter, text in parameters}
             if not numbers:
+                unread.append(at)
                 continue
             is_unknown = command is not None and _WORD.sub("", command[1].upper()).strip()
             if is_unknown or len(numbers) < len(parameters) or not numbers.keys() <= {*"SXYZP"}:
@@ -421,9 +449,10 @@ def _read_m556(sources: Sequence[Source], options: ReadOptions) -> Tables:
                     options.axis_named(axis, at)
                 matrix[AXES.index(row), AXES.index(column)] = deviation / length
             is_empty = False
+        notes += unread_notes(unread)
     if is_empty:
         sources[0].refuse("has no axis compensation", "M556 S… X… Y… Z…")
-    return Tables((Affine(AXES, tuple(map(tuple, matrix.tolist()))),), (), (), ("mm",))
+    return Tables((Affine(AXES, tuple(map(tuple, matrix.tolist()))),), (), tuple(notes), ("mm",))
 
 
 KLIPPER = Format(

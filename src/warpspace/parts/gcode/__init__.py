@@ -1,0 +1,1 @@
+"""G-code programs: words, dialects, the control that executes them, and their moves."""

@@ -1,0 +1,1 @@
+"""Dialects of G-code, one module each."""
