@@ -1,6 +1,9 @@
 """The drawing of the rotary axes: what it shows, against closed forms, and its playback."""
 
+import time
+from contextlib import nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,12 +13,14 @@ from warpspace.app.documents import legend
 from warpspace.app.drawing.around import draw_surroundings
 from warpspace.app.drawing.box import box
 from warpspace.app.drawing.labels import axis_labels, point_labels
+from warpspace.app.drawing.moving import MovingLayer
 from warpspace.app.evaluation.machine_bodies import played_angle, played_position
 from warpspace.app.panels.error_list import _gains
 from warpspace.app.panels.overlay import ControlsPanel, HeadPanel, OrderPanel
 from warpspace.app.panels.playback import PlaybackPanel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
+from warpspace.machine.axes import parameter
 from warpspace.scene.library import load_scene
 
 FIRST = load_scene("dvf5000_first")
@@ -28,11 +33,15 @@ class Stage:
 
     def __init__(self):
         self.followers, self.position, self.playing, self.axis = {}, {}, False, None
-        self.speed_deg_s, self.asked = 30.0, []
+        self.speed_deg_s, self.asked, self.sample = 30.0, [], None
 
     def play(self, on, axis=None):
         self.asked.append(("play", on, axis))
         self.playing, self.axis = bool(on), axis
+
+    def scrub_program(self, sample):
+        self.asked.append(("program", sample))
+        self.sample = sample
 
     def scrub(self, axis, at_deg):
         self.asked.append(("scrub", axis, at_deg))
@@ -169,3 +178,76 @@ def test_the_bar_plays_pauses_scrubs_and_ignores_what_is_no_position():
     assert 'aria-label="Position of C"' in html
     volume = LIVE.evaluate(put(ROTARY, "look.drawing", "volume"))
     assert bar.part.render(volume)["playback"] == ""
+
+
+PROGRAM_TEXT = "G21 G90 G54\nG0 X-200 Y0 Z-100\nG1 X200 F500\nG1 Y200\nM30\n"
+
+
+def with_program():
+    part = replace(START.part, program=PROGRAM_TEXT, program_name="a.nc")
+    return replace(START, part=part)
+
+
+def test_a_program_is_played_to_its_worst_block_with_line_error_and_cause():
+    state, stage = with_program(), Stage()
+    picture = LIVE.evaluate(state)
+    assert picture.path is not None
+    bar = Alone(PlaybackPanel, state, stage=stage)
+    assert 'aria-label="Position in the program"' in bar.part.render(picture)["playback"]
+    bar.do("worst")
+    lengths = np.linalg.norm(picture.path.error_um, axis=1)
+    assert stage.asked == [("play", False, None), ("program", int(np.argmax(lengths)))]
+    html = bar.part.render(picture)["playback"]
+    line = int(picture.path.of.line[np.argmax(lengths)])
+    assert f"line {line}</span>" in html
+    assert PROGRAM_TEXT.splitlines()[line - 1] in html
+    assert f"{lengths.max():.1f} µm, " in html
+    assert " because " in html
+    bar.do("set.program", "3")
+    bar.do("set.program", "99999999")
+    bar.do("set.program", "<b>")
+    bar.do("play", "program")
+    assert stage.asked[2:] == [("program", 3), ("play", True, "program")]
+
+
+def test_the_cause_of_a_sample_is_that_of_the_explanation_of_its_point():
+    state = with_program()
+    picture = LIVE.evaluate(state)
+    path = picture.path
+    sample = int(np.argmax(np.linalg.norm(path.error_um, axis=1)))
+    values = state.amplitudes
+    effects = {}
+    for key, value in values.items():
+        without = LIVE.evaluate(replace(state, amplitudes={**values, key: 0.0})).path
+        effects[key] = float(
+            (path.error_um[sample] - without.error_um[sample]) @ path.error_um[sample]
+        )
+        assert value or not effects[key]
+    first = max(effects, key=lambda key: abs(effects[key]))
+    bar = Alone(PlaybackPanel, state, stage=Stage())
+    bar.do("worst")
+    assert f"because {parameter(first).cause}" in bar.part.render(picture)["playback"]
+
+
+def test_the_stage_moves_the_machine_along_the_program():
+    """The layer with a client that draws nothing."""
+    state = with_program()
+    picture = LIVE.evaluate(state)
+    stage = MovingLayer.__new__(MovingLayer)
+    stage._picture, stage.followers, stage.sample, stage._turned_at = picture, {}, None, None
+    stage.axis, stage.speed_deg_s, stage.position, stage._turned_deg = None, 30.0, {}, 0.0
+    stage._client = SimpleNamespace(atomic=nullcontext)
+    stage._turning = SimpleNamespace(draw=lambda shapes: None)
+    stage.play(True, "program")
+    stage._turned_at -= 0.4  # of the 20 s of a program
+    stage.turn()
+    count = len(picture.path.of.line)
+    assert 0.01 * count < stage.sample < 0.05 * count + 1.0
+    assert stage.position == picture.path.of.axes_at(int(stage.sample))
+    stage.scrub_program(1e9)
+    assert stage.sample == count - 1
+    stage._turned_at = time.monotonic() - 0.4
+    stage.turn()
+    assert not stage.playing
+    stage.play(None)
+    assert (stage.sample, stage.position) == (None, {})

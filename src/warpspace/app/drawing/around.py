@@ -259,6 +259,15 @@ def turned_points(picture: LivePicture, position: dict[str, float]) -> Shapes:
     }
 
 
+def program_point(picture: LivePicture, sample: int) -> Shapes:
+    """Draw the tool point at a sample of the path of the program."""
+    path = picture.path
+    if path is None:
+        return {}
+    at = path.drawn_mm(picture.exaggeration)[sample : sample + 1]
+    return {"/rotation/program": dots(at, TURNED * picture.size_mm, ACCENT)}
+
+
 def residuals(
     foot_mm: Array, vector_mm: Array, size_mm: float, *, before: bool
 ) -> tuple[Shapes, float]:

@@ -9,7 +9,7 @@ from viser import ClientHandle
 from viser.transforms import SO3
 
 from warpspace.app.browser.page import Page
-from warpspace.app.drawing.around import GIZMO, draw_surroundings, turned_points
+from warpspace.app.drawing.around import GIZMO, draw_surroundings, program_point, turned_points
 from warpspace.app.drawing.colours import Rgb, colour
 from warpspace.app.drawing.shapes import SCENE_PER_MM, Nodes, SceneNode, Shapes, ball, lines, mesh
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -28,6 +28,8 @@ from warpspace.kinematics import transforms
 STEP_S = 0.125  # between two pictures of a rotating table; each is sent to the page
 LONGEST_STEP_S = 0.5  # longer delays are skipped
 SPEEDS_DEG_S = (10.0, 30.0, 90.0)
+PROGRAM = "program"  # what plays, in place of the name of an axis
+PROGRAM_S = 20.0  # time of a whole program at the middle speed
 
 BALL = 0.010  # marker of the tool point, relative to the longest edge
 OPACITY = 0.045
@@ -78,7 +80,8 @@ class MovingLayer:
         self._ghost_of: object = None
         self.position: dict[str, float] = {}  # of animated axes, degrees; empty while stopped
         self.followers: dict[str, Callable[[], None]] = {}  # called after each step, by panel
-        self.axis: str | None = None  # the axis that plays
+        self.axis: str | None = None  # the axis that plays, or `PROGRAM`
+        self.sample: float | None = None  # of the path of the program; None while stopped
         self.speed_deg_s = SPEEDS_DEG_S[1]
         self.clamp: Callable[[str], None] = lambda _place: None  # called after a drag
         self._turned_deg = 0.0
@@ -90,8 +93,9 @@ class MovingLayer:
         before, self._picture = self._picture.state, picture
         now = picture.state
         same = before.origin is now.origin and before.scene.machine is now.scene.machine
+        same &= before.part.program is now.part.program
         if not same or before.positions != now.positions:
-            self._turned_at, self._turned_deg = None, 0.0
+            self._turned_at, self._turned_deg, self.sample = None, 0.0, None
             self._stand({})
         self._around.draw({**self._gizmo(picture), **draw_surroundings(picture)})
         self._draw_ghost(picture)
@@ -127,7 +131,10 @@ class MovingLayer:
 
     def _draw_turning(self) -> None:
         picture, position = self._picture, self.position
-        self._turning.draw({**turned_points(picture, position), **machine(picture, position)})
+        shapes = {} if self.sample is not None else turned_points(picture, position)
+        if self.sample is not None:
+            shapes = program_point(picture, int(self.sample))
+        self._turning.draw({**shapes, **machine(picture, position)})
 
     @property
     def playing(self) -> bool:
@@ -135,9 +142,15 @@ class MovingLayer:
 
     def play(self, on: bool | None, axis: str | None = None) -> None:
         """Play an axis (True), pause (False), or return to the axis positions (None)."""
+        if on and axis == PROGRAM:
+            self.axis, self._turned_at = axis, time.monotonic()
+            path = self._picture.path
+            if self.sample is None or (path and self.sample >= len(path.of.line) - 1):
+                self.sample = 0.0
+            return
         if on:
             state = self._picture.state
-            self.axis = axis or played_axis(state)
+            self.axis, self.sample = axis or played_axis(state), None
             at = self.position.get(self.axis or "")
             if axis != self.axis or at is not None:
                 self._turned_deg = played_angle(state, self.axis, at)
@@ -145,15 +158,22 @@ class MovingLayer:
             return
         self._turned_at = None
         if on is None:
-            self._turned_deg = 0.0
+            self._turned_deg, self.sample = 0.0, None
             self._stand({}, drawn=True)
         else:
             self._moved()
 
     def scrub(self, axis: str, at_deg: float) -> None:
         """Move an axis to a position by hand, which ends playing."""
-        self._turned_at = None
+        self._turned_at, self.sample = None, None
         self._stand({**self.position, axis: at_deg}, drawn=True)
+
+    def scrub_program(self, sample: float) -> None:
+        """Move the machine to a sample of the path of the program; playing goes on from there."""
+        path = self._picture.path
+        if path is not None:
+            self.sample = min(max(sample, 0.0), len(path.of.line) - 1.0)
+            self._stand(path.of.axes_at(int(self.sample)), drawn=True)
 
     def _moved(self) -> None:
         for follow in self.followers.values():
@@ -168,6 +188,13 @@ class MovingLayer:
     def turn(self) -> None:
         now = time.monotonic()
         since = min(now - (self._turned_at or now), LONGEST_STEP_S)
+        if self.axis == PROGRAM:
+            path, share = self._picture.path, since / PROGRAM_S * self.speed_deg_s / SPEEDS_DEG_S[1]
+            count = 0 if path is None else len(path.of.line)
+            sample = (self.sample or 0.0) + count * share
+            self._turned_at = now if sample < count - 1 else None
+            self.scrub_program(sample)
+            return
         self._turned_deg = (self._turned_deg + self.speed_deg_s * since) % 360.0
         self._turned_at = now
         played = played_position(self._picture.state, self._turned_deg, self.axis)

@@ -23,6 +23,7 @@ from warpspace.app.evaluation.point_explanation import explain_point, pick, pick
 from warpspace.app.panels.conventions import with_travel
 from warpspace.app.panels.design import allowed_words
 from warpspace.app.panels.panel import Context, Panel, Refresh, setting, tiny
+from warpspace.app.panels.playback import share_words
 from warpspace.app.state.app_state import COMPARISON_VIEWS, COMPONENT_NAMES, NOBODY, AppState, Side
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import DRAWINGS, QUANTITIES, SURFACES, slice_positions
@@ -33,8 +34,6 @@ from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection, is_linear, 
 from warpspace.picture.formatting import spell_factor
 from warpspace.picture.map_mesh import isoline_labels
 from warpspace.units import Array, spell_short
-
-MOSTLY = 0.5  # share of the largest error above which its first contribution is most of it
 
 
 class HeadPanel(Panel):
@@ -118,8 +117,8 @@ def cause_words(picture: LivePicture) -> str:
     if not worst.ranked or not worst.length_um:
         return ""
     first = worst.ranked[0]
-    share = first.along_um / worst.length_um
-    return f", {'mostly' if share > MOSTLY else 'partly'} because {parameter(first.key).cause}"
+    share = share_words(first.along_um / worst.length_um)
+    return f", {share} because {parameter(first.key).cause}"
 
 
 class OverlayPanel(Panel):

@@ -2,14 +2,26 @@
 
 from collections.abc import Mapping
 
+import numpy as np
+from markupsafe import Markup
+
 from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button, fill, join, tag
-from warpspace.app.drawing.moving import SPEEDS_DEG_S, MovingLayer
+from warpspace.app.browser.html import EMPTY, button, fill, join, number, tag
+from warpspace.app.browser.incoming import index_of
+from warpspace.app.drawing.moving import PROGRAM, SPEEDS_DEG_S, MovingLayer
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import rotary_axes
 from warpspace.app.panels.panel import Panel, Refresh
 from warpspace.app.state.app_state import AppState
+from warpspace.machine.axes import parameter
 from warpspace.units import MINUS
+
+MOST_LETTERS = 60  # of a line of the program
+MOSTLY = 0.5  # share of an error above which its largest contribution is most of it
+
+
+def share_words(share: float) -> str:
+    return "mostly" if share > MOSTLY else "partly"
 
 
 class PlaybackPanel(Panel):
@@ -19,15 +31,16 @@ class PlaybackPanel(Panel):
     refresh = Refresh.IMMEDIATE
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        if not picture.is_rotary:
-            return {"playback": EMPTY}
         state, stage = picture.state, self.context.stage
+        if not picture.is_rotary and picture.path is None:
+            return {"playback": EMPTY}
         if stage is not None:
             stage.followers[self.name] = self.rerender
         speed = SPEEDS_DEG_S[1] if stage is None else stage.speed_deg_s
         speeds = {f"{at:g}": f"{at:g} °/s" for at in SPEEDS_DEG_S}
         bar = (
-            *(_row(state, stage, axis) for axis in rotary_axes(state)),
+            *((_row(state, stage, axis) for axis in rotary_axes(state)) if picture.is_rotary
+              else (_program(picture, stage),)),
             html.choice("playback:speed", f"{speed:g}", speeds, label="Speed of rotation"),
             button("Reset", "playback:stop", kind="quiet",
                    hint="Return to the axis positions of the scene"),
@@ -36,23 +49,76 @@ class PlaybackPanel(Panel):
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         context, stage = self.context, self.context.stage
-        axes = rotary_axes(state)
-        if stage is None or not axes:
+        axes = rotary_axes(state) if state.shows_rotary else (PROGRAM,)
+        if stage is None:
             return state
         name = action.removeprefix("set.")
         if action == "play":
-            axis = value if value in axes else stage.axis or axes[-1]
+            axis = value if value in axes else stage.axis if stage.axis in axes else axes[-1]
             on = not (stage.playing and stage.axis == axis)
             context.call_soon(lambda: stage.play(on, axis))
         elif action == "stop":
             context.call_soon(lambda: stage.play(None))
         elif action == "speed" and value in {f"{at:g}" for at in SPEEDS_DEG_S}:
             stage.speed_deg_s = float(value)
+        elif PROGRAM in axes:
+            self._move_program(stage, action, value)
         elif action != name and name in axes:
             at = _clamped(state, name, value)
             if at is not None:
                 context.call_soon(lambda: stage.scrub(name, at))
         return state
+
+    def _move_program(self, stage: MovingLayer, action: str, value: str) -> None:
+        path = self.context.picture and self.context.picture.path
+        if not path:
+            return
+        if action == "worst":
+            worst = int(np.argmax(np.linalg.norm(path.error_um, axis=1)))
+            self.context.call_soon(lambda: stage.play(False))
+            self.context.call_soon(lambda: stage.scrub_program(worst))
+        sample = index_of(value, len(path.error_um))
+        if action == f"set.{PROGRAM}" and sample is not None:
+            self.context.call_soon(lambda: stage.scrub_program(sample))
+
+
+def _program(picture: LivePicture, stage: MovingLayer | None) -> Markup:
+    """Render the slider of the program, with line, error and its main cause."""
+    path = picture.path
+    assert path is not None  # noqa: S101 - checked by the panel
+    sample = 0 if stage is None or stage.sample is None else int(stage.sample)
+    sample = min(sample, len(path.error_um) - 1)
+    plays = stage is not None and stage.playing and stage.axis == PROGRAM
+    line, text = int(path.of.line[sample]), (picture.state.part.program or "").splitlines()
+    code = text[line - 1][:MOST_LETTERS] if 0 < line <= len(text) else ""
+    words = f"line {line}"
+    return fill(
+        '<div class="ws-turn">{play}<b>Program</b>{slider}<span>{words}</span>{worst}</div>'
+        '<div class="ws-line"><code>{code}</code> {error}</div>',
+        play=button("Pause" if plays else "Play", "playback:play", PROGRAM, kind="quiet",
+                    aria_label=f"{'Pause' if plays else 'Play'} the program",
+                    data_key="play-program", hint="Move the machine along the path (P)"),
+        slider=html.slider(f"playback:set.{PROGRAM}", sample, 0, len(path.error_um) - 1, 1.0,
+                           label="Position in the program", text=words),
+        words=words, code=code, error=_error_words(picture, sample),
+        worst=button("Worst", "playback:worst", kind="quiet", hint="Go to the largest error"),
+    )  # fmt: skip
+
+
+def _error_words(picture: LivePicture, sample: int) -> str:
+    """Format the error of a sample and the error parameter that contributes most to it."""
+    path, state = picture.path, picture.drawn_state
+    assert path is not None  # noqa: S101 - checked by the panel
+    error = path.error_um[sample]
+    length = float(np.linalg.norm(error))
+    words = f"{number(length)} µm"
+    if picture.is_difference or state.controller is not None or not length:
+        return words
+    amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
+    along = amplitudes * (path.response[:, 3 * sample : 3 * sample + 3] @ error) / length
+    first = int(np.argmax(np.abs(along)))
+    cause = parameter([*state.amplitudes][first]).cause
+    return f"{words}, {share_words(float(along[first]) / length)} because {cause}"
 
 
 def _clamped(state: AppState, axis: str, value: str) -> float | None:
