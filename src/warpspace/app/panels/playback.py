@@ -37,11 +37,12 @@ class PlaybackPanel(Panel):
         if stage is not None:
             stage.followers[self.name] = self.rerender
         speed = SPEEDS_DEG_S[1] if stage is None else stage.speed_deg_s
-        speeds = {f"{at:g}": f"{at:g} °/s" for at in SPEEDS_DEG_S}
+        middle, rotary = SPEEDS_DEG_S[1], picture.is_rotary
+        speeds = {f"{s:g}": f"{s:g} °/s" if rotary else f"{s / middle:.1g} ×" for s in SPEEDS_DEG_S}
         bar = (
             *((_row(state, stage, axis) for axis in rotary_axes(state)) if picture.is_rotary
               else (_program(picture, stage),)),
-            html.choice("playback:speed", f"{speed:g}", speeds, label="Speed of rotation"),
+            html.choice("playback:speed", f"{speed:g}", speeds, label="Speed"),
             button("Reset", "playback:stop", kind="quiet",
                    hint="Return to the axis positions of the scene"),
         )  # fmt: skip
