@@ -7,8 +7,10 @@ so that results do not depend on the tessellation.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpspace.machine.limits import MAX_REFINED_VERTICES
 from warpspace.parts.workpiece import (
@@ -23,9 +25,7 @@ from warpspace.units import Array
 
 SURFACE_POINTS = 2500  # vertices of an evenly refined surface, at least
 BEND_SHARE, BEND_UM = 0.02, 0.01  # of the placed RMS; errors that bend less are linear
-CHECKED = (
-    0.382  # place on an edge, off the middle: a periodic error may vanish there as at the ends
-)
+CHECKED = 0.382  # place on an edge: in the middle, as at the ends, a periodic error may vanish
 
 
 def sample_vertices(mesh: Workpiece, count: int) -> tuple[Array, Array]:
@@ -90,30 +90,42 @@ def _divide(
     `measure` is evaluated for corners of triangles, [n, 3, 3], their longest edge first, unless the
     square of that is below `short_mm2`. At most `room` vertices are added.
     """
-    vertices, triangles, largest = mesh.vertices_mm, mesh.triangles, 0.0
-    source = np.arange(len(triangles)) if mesh.source is None else mesh.source
-    rows = np.flatnonzero(mesh.sizes[1] > short_mm2)
+    vertices: Array = mesh.vertices_mm
+    triangles: NDArray[Any] = mesh.triangles
+    source: NDArray[Any] = np.arange(len(triangles)) if mesh.source is None else mesh.source
+    rows: NDArray[Any] = np.flatnonzero(mesh.sizes[1] > short_mm2)
+    largest = 0.0
     while rows.size and room > 0:
-        corner = vertices[triangles[rows]]
-        edge = np.roll(corner, -1, axis=1) - corner
-        order = np.einsum("tex,tex->te", edge, edge).argmax(axis=1)[:, None] + np.arange(3)
-        value = measure(np.take_along_axis(corner, order[..., None] % 3, axis=1))
-        chosen = np.argsort(-value)[: min(room, np.count_nonzero(value > limit))]
-        largest = max(largest, np.delete(value, chosen).max(initial=0.0))
-        rows = rows[chosen]
-        first, last, apex = np.take_along_axis(triangles[rows], order[chosen] % 3, axis=1).T
-        # neighbours that share their longest edge share its middle
-        edges = np.sort(np.stack([first, last], axis=1), axis=1)
-        ends, middle = np.unique(edges, axis=0, return_inverse=True)
-        middle = (middle.reshape(-1) + len(vertices)).astype(np.int32)
-        vertices = np.concatenate([vertices, vertices[ends].mean(axis=1)])
-        triangles = np.concatenate([triangles, np.stack([middle, last, apex], axis=1)])
-        triangles[rows] = np.stack([first, middle, apex], axis=1)
-        rows, source = (
-            np.concatenate([rows, np.arange(len(source), len(triangles))]),
-            np.concatenate([source, source[rows]]),
-        )
+        number = _longest_edge_first(vertices, triangles[rows])
+        value = measure(vertices[number])
+        chosen: NDArray[Any] = np.argsort(-value)[: min(room, np.count_nonzero(value > limit))]
+        largest = max(largest, float(np.delete(value, chosen).max(initial=0.0)))
+        count, rows = len(vertices), rows[chosen]
+        vertices, kept, added = _halve(vertices, number[chosen])
+        triangles = np.concatenate([triangles, added])
+        triangles[rows] = kept
+        halves = np.arange(len(source), len(triangles))
+        source = np.concatenate([source, source[rows]])
+        rows = np.concatenate([rows, halves])
         rows = rows[measure_triangles(vertices, triangles[rows])[1] > short_mm2]
-        room -= len(ends)
+        room -= len(vertices) - count
     fine = replace(mesh, vertices_mm=vertices, triangles=triangles)
-    return replace(fine, original=mesh.original or mesh, source=source), float(largest)
+    return replace(fine, original=mesh.original or mesh, source=source), largest
+
+
+def _longest_edge_first(vertices: Array, triangles: NDArray[Any]) -> NDArray[Any]:
+    corner = vertices[triangles]
+    edge = np.roll(corner, -1, axis=1) - corner
+    longest = np.einsum("tex,tex->te", edge, edge).argmax(axis=1)
+    return np.take_along_axis(triangles, (longest[:, None] + np.arange(3)) % 3, axis=1)
+
+
+def _halve(vertices: Array, triangles: NDArray[Any]) -> tuple[Array, NDArray[Any], NDArray[Any]]:
+    """Halve triangles at their first edge: return all vertices, and the first and other halves."""
+    first, last, apex = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    # neighbours that share their longest edge share its middle
+    edges = np.sort(np.stack([first, last], axis=1), axis=1)
+    ends, inverse = np.unique(edges, axis=0, return_inverse=True)
+    middle = (inverse.reshape(-1) + len(vertices)).astype(np.int32)
+    added = np.concatenate([vertices, vertices[ends].mean(axis=1)])
+    return added, np.stack([first, middle, apex], axis=1), np.stack([middle, last, apex], axis=1)
