@@ -175,6 +175,13 @@ def turned(page: Page) -> None:
     page.locator(".ws-plots").wait_for()
 
 
+def rotated(page: Page) -> None:
+    """Look at the rotary axes, with the table turned by the playback bar."""
+    page.get_by_role("button", name="Rotary axes", exact=True).click()
+    page.get_by_label("Position of C", exact=True).fill("60")
+    page.locator(".ws-plots").wait_for()
+
+
 def imported(page: Page) -> None:
     """Open a table of measured errors."""
     with page.expect_file_chooser() as chooser:
@@ -232,6 +239,13 @@ def programmed(page: Page) -> None:
     page.locator("[data-key=program]").get_by_role("button", name="28", exact=True).first.click()
 
 
+def played(page: Page) -> None:
+    """Move the machine to the worst block of the program."""
+    programmed(page)
+    page.get_by_role("button", name="Worst", exact=True).click()
+    page.locator(".ws-line", has_text="because").wait_for()
+
+
 VISITS = {
     "app": Visit(as_opened),
     "app_dark": Visit(dark),
@@ -244,6 +258,7 @@ VISITS = {
     "task_improve": Visit(improved),
     "task_design": Visit(designed),
     "task_machine": Visit(turned, "teach_wobbling_table"),
+    "rotary_axes": Visit(rotated, "teach_wobbling_table"),
     "task_import": Visit(imported),
     "window_report": Visit(reported),
     "review_notes": Visit(noted, "review_dvf5000"),
@@ -251,6 +266,7 @@ VISITS = {
     "review_distance": Visit(measured),
     "part_box": Visit(clamped, "part_on_dvf5000"),
     "part_program": Visit(programmed, "part_on_dvf5000"),
+    "program_playback": Visit(played, "part_on_dvf5000"),
     "uncertainty": Visit(unsure, "uncertain"),
     "errors_row": Visit(opened_row, part="#ws-left"),
 }
