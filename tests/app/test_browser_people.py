@@ -189,5 +189,5 @@ def test_a_screen_reader_finds_landmarks_headings_and_names(tab, themes):
         tab.send("notes:close")
     for landmark in ("banner", "navigation", "main", "complementary"):
         assert tab.page.get_by_role(landmark).count() == 1, landmark
-    for role, name in (("heading", "^mean .* max 51.7 µm"), ("slider", "^EAX roll of X$")):
+    for role, name in (("heading", "^Errors up to 51.7 µm"), ("slider", "^EAX roll of X$")):
         assert tab.page.get_by_role(role, name=re.compile(name)).count() == 1, role
