@@ -392,9 +392,9 @@ PRINT_MM = 2 + sqrt(10.1**2 + 20**2 + 1.72**2) + 70
 @pytest.mark.parametrize(
     ("text", "length", "options"),
     [
-        # b01: lead-in arcs in G18, inches
+        # lead-in arcs in G18, inches
         (ARCS_G18, 3.10348 * INCH, {}),
-        # b02: arcs by their radius; a chord a little above the diameter is a half circle
+        # arcs by their radius; a chord a little above the diameter is a half circle
         (DRAG_KNIFE, hypot(6.0004, 9.2749) + 0.85 + 2 * arc(1, hypot(1.4137, 0.0009))
          + hypot(2.5907, 2.5959) + hypot(1.1807, 3.0583) + arc(1, hypot(1.4146, 1.4139)) + 0.85,
          {}),
@@ -405,38 +405,38 @@ PRINT_MM = 2 + sqrt(10.1**2 + 20**2 + 1.72**2) + 70
         (block("G21 G90", "G0 X0 Y0 Z0", "G3 X41.089 Y-28.164 I20.5445 J-14.082 F1256",
                "X0 Y0 I-20.5445 J14.082", "M2"), tau * hypot(20.5445, 14.082), {}),
         ("G17 G21 G90 G90 G94 G54 M0 M5 M9\nG0 X10 Y10.0 Z0\nG02 X20 Y0 R-10", 15 * pi, {}),
-        # b03: cycles of LinuxCNC in two planes
+        # cycles of LinuxCNC in two planes
         (CYCLES.format("g17 ; XY", "g0 x0 y0 z2", *"xyz" * 3), 19.41421 * INCH, {}),
         (CYCLES.format("g19 ; YZ", "g0 x2 y0 z0", *"yzx" * 3), 19.41421 * INCH, {}),
-        # b04: the sample program of a circle and a diamond
+        # the sample program of a circle and a diamond
         (CIRCLE_DIAMOND, 554.0823, {}),
-        # b10: words after shifts and rotations
+        # words after shifts and rotations
         (REFERENCE, sqrt(100**2 + 50**2 + 10**2) + 10 + 10, {}),
         (ROTATED, 15 + 10 + hypot(20 * cos(radians(30)) - 10, 20 * sin(radians(30))) + 15, {}),
-        # b11: G234 is G43.4; mirror of Haas
+        # G234 is G43.4; mirror of Haas
         (TCP.format("G234"), 105.28, {"scene": BC, **H1}),
         (TCP.format("G43.4"), 105.28, {"scene": BC, **H1}),
         (MIRRORED, 10 + 30 + 50, {"dialect": "haas"}),
-        # b12, b23: G83 with Q; pecks of Haas without it, or with a least peck K that has no effect
+        # G83 with Q; pecks of Haas without it, or with a least peck K that has no effect
         (PECKS.format(""), TWO_HOLES, {}),
         (PECKS.format("K0.2"), TWO_HOLES, {"dialect": "haas"}),
         (PECKS.format("K3."), TWO_HOLES, {"dialect": "haas"}),
         (DEEP_HOLES, 100 + 3 * holes(42, 8, [10, 8, 6, 4, 3, 3, 3, 3, 2]), H1),
-        # b13, b15: tool length of Okuma, with its header
+        # tool length of Okuma, with its header
         (OKUMA_REFERENCE.format("G56"), 450 + 50 + 50, H1),
         (OKUMA_REFERENCE.format("G43"), 450 + 50 + 50, H1),
         (OKUMA, 250 + 50 + 50 + 5 * pi + 50, H1),
         (OKUMA, 350 + 50 + 50 + 5 * pi + 50, {}),
-        # b15: headers, and bytes of punched tapes
+        # headers, and bytes of punched tapes
         (HEADED.format("%\n<FLANGE_OP1>(FLANGE)"), 50, {}),
         (HEADED.format("%\nO<FLANGE_OP1>(FLANGE)"), 50, {}),
         (HEADED.format("% PART 1234-5 REV B\nO1001"), 50, {}),
         (HEADED.format("\0\0\0%\nO1001") + "\n\0\0", 50, {}),
         (FACE.format("%_N_1001_MPF\n;$PATH=/_N_WKS_DIR", 'T="FACE_50"'), 65 + 10 * pi, {}),
-        # b16: rounded and chamfered corners
+        # rounded and chamfered corners
         (block("O100 (CORNER)", "G21 G90 G17", "G0 X0 Y0 Z0", "G1 X50 ,R5. F300", "Y50 ,C2.", "X0",
                "M30"), 45 + 2.5 * pi + 43 + 8**0.5 + 48, {}),
-        # b18: everyday words
+        # everyday words
         (SPACERS, 15 + 16 + 10 + 16 + 10 + sqrt(0.647**2 + 0.47**2 + 7.5**2)
          + arc(hypot(2.508, 3.453), hypot(1.759, 3.453)) + 12.5 + 20 + 2.15 * pi + 2.5, {}),
         (block("%", "O1", "G21 G90 G17", "G91 G30 Z0", "T1 M6", "G90 G54 G0 X0 Y0", "G43 H1 Z10",
@@ -449,24 +449,24 @@ PRINT_MM = 2 + sqrt(10.1**2 + 20**2 + 1.72**2) + 70
         (REPEATED, 24 + sqrt(20**2 - 20**2 + 10**2 + 10**2 + 4**2) + 48, {}),
         (WEAR, 95 + 23 + 2.5 + 0.251 + 3 * pi + 50 + 0.75 * pi + 45.751,
          {"offset": (("D1", 0.0),)}),
-        # b19: rotation in the plane; names of tools
+        # rotation in the plane; names of tools
         ("G17 G90\nG0 X0 Y0 Z0\nROT RPL=45\nG1 X10 F100\nM30", 10, {}),
         (FACE.format(";$PATH=/_N_WKS_DIR", "T1"), 65 + 10 * pi, {}),
         (block("N13 G17 G90", 'N15 T="FACE_50"', "N16 M6", "N18 G54", "N19 G0 X0 Y0", "N20 Z15",
                "N22 X10", "N26 M30"), 10, {}),
-        # b20: E without a blank
+        # E without a blank
         ("G21G90G17\nG0X0Y0Z0\nG187P3E0.01\nG1X10.F100\nM30", 10, {}),
         ("G21G90G17\nG0X0Y0Z0\nG187 P3 E0.01\nG1X10.F100\nM30", 10, {}),
-        # b22: a move with a new tool length
+        # a move with a new tool length
         ("G21 G90 G17\nG0 X0 Y0 Z0\nG43 H1 Z-200\nG1 X10 F100\nM30", 110, H1),
-        # b23: a depth that is the R plane
+        # a depth that is the R plane
         (f"{SPOTS}M30", SPOTS_MM, {}),
-        # b25: numbers without a decimal point
+        # numbers without a decimal point
         (HEADED.replace("10\n", "10000\n").replace("X50 F300", "X50000 F300\nY50000").format("%"),
          100_000, {}),
         (HEADED.replace("10\n", "10000\n").replace("X50 F300", "X50000 F300\nY50000").format("%"),
          100, {"least_increment": 0.001}),
-        # b28, b31: words of slicers, parameters of M words
+        # words of slicers, parameters of M words
         (block("G90", "M82", "G28", "G0F3600X90.1Y89.2Z0.3", "G1F1800X100.2Y89.2E0.5",
                "G1X101Y90E0.7", "M400"), sqrt(90.1**2 + 89.2**2 + 0.3**2) + 10.1 + hypot(0.8, 0.8),
          {"scene": PRINTER}),
@@ -486,28 +486,28 @@ def test_the_whole_program_is_executed(text: str, length: float, options: dict[s
 @pytest.mark.parametrize(
     ("text", "length", "refusal", "options"),
     [
-        # b10: X and Y are not programmed after the shift
+        # X and Y are not programmed after the shift
         (SHIFTED, 0, (4, "G1", "expected X, Y before"), {"offset": (("G54Z", -400.0),)}),
-        # b11: words of Fanuc that bend the path; mirror without a dialect; a turned work offset
+        # words of Fanuc that bend the path; mirror without a dialect; a turned work offset
         (CORNERS, 0, (3, "G7.1", "expected a word that is executed"), {}),
         (MIRRORED, 10, (4, "G101", "--dialect haas"), {}),
         (WORK_OFFSET, 20, (9, "B30", "G254 cancelled before"), {"scene": BC, **H1}),
-        # b12: repetitions or the least peck
+        # repetitions or the least peck
         (PECKS.format("K0.2"), 0, (3, "K0.2", "--dialect haas"), {}),
         (PECKS.format("K3."), 0, (3, "K3", "--dialect haas"), {}),
-        # b16: a corner next to an arc
+        # a corner next to an arc
         (block("G17", "G54X0Y0", "G01X10.Y10.,R20.", "G02X40.Y15.R20.,R0.5", "G01Y20.", "X50.,R2.",
                "X50.Y0", "M02"), 10 * sqrt(2), (4, ",R0.5", "no ,R with G2"), {}),
-        # b18: an unknown wear
+        # an unknown wear
         (WEAR, 95 + 23 + 2.5, (11, "G41", "--offset D1=0"), {}),
-        # b19: a plane without rotary axes, and with X and Y that are not programmed in it
+        # a plane without rotary axes, and with X and Y that are not programmed in it
         (SWIVELLED, 0, (7, "CYCLE800", "two rotary axes"), {}),
         (SWIVELLED, 0, (8, "G1", "expected X before"), {"scene": AC}),
         (SWIVELLED.replace("CYCLE800", ";"), 25, (10, "CYCLE81", "expected a word"), {}),
-        # b23: no pecks
+        # no pecks
         (SPOTS + "G83 Z-7.732 R0.21 Q0. P0 F200\n  X40.2 Y9.615 Z0.21\nG80\nM30",
          SPOTS_MM, (7, "G83", "pecks of Q above 0"), {}),
-        # b27: a shift of SINUMERIK
+        # a shift of SINUMERIK
         (block("G17 G90", "G54", "G0 X0 Y0 Z0", "G58 X10 Y20", "G1 X5 F100", "G500", "G1 X30",
                "M30"), 0, (4, "G58", "expected a word that is executed"), {}),
     ],
@@ -589,16 +589,16 @@ TURNED = "G21 G90 G17 G54\nG0 X0 Y0 Z0 A0 C{}\nG43.4 H1 Z-100.\nX50. Y0\nC{}\nG4
 @pytest.mark.parametrize(
     ("text", "scene", "options", "line", "expected"),
     [
-        # a09: kinematics of LinuxCNC; a table by ISO 841 turns against its letter
+        # kinematics of LinuxCNC; a table by ISO 841 turns against its letter
         (JOINTS, parse_scene(XYZBC.format(-1), "iso"), {}, 3, {"X": -2, "Y": 0, "Z": 1}),
         (JOINTS, parse_scene(XYZBC.format(-1), "iso"), {}, 4, {"X": 0, "Y": -1, "Z": 2}),
         (JOINTS, parse_scene(XYZBC.format(1), "by the letter"), {}, 3, {"X": 2, "Y": 0, "Z": -1}),
         (JOINTS, parse_scene(XYZBC.format(1), "by the letter"), {}, 4, {"X": 0, "Y": 1, "Z": 2}),
         ("G21 G90 G43.4\nG1 X50 Y0 Z100 B0 C90 F500\nM30", parse_scene(XYZBC.format(-1), "iso"),
          {}, 2, {"X": 0, "Y": -50, "Z": 100}),
-        # b13: the length counts
+        # the length counts
         (OKUMA_REFERENCE.format("G56"), MILL, H1, 5, {"Z": -100}),
-        # b29: frame of the table at G43.4 (FANUC), or at rotary zero
+        # frame of the table at G43.4 (FANUC), or at rotary zero
         (TURNED.format("90.", "180."), AC, H1, 4, {"X": 50, "Y": 0, "C": 90}),
         (TURNED.format("90.", "180."), AC, {**H1, "tcp_frame": "zero"}, 4, {"X": 0, "Y": 50}),
         (TURNED.format("0", "90."), AC, H1, 4, {"X": 50, "Y": 0}),

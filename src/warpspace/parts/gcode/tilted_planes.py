@@ -117,6 +117,7 @@ class TiltedPlanes(Motion):
 
     def swivel_cycle(self, code: str) -> None:
         """Execute CYCLE800 with rotations axis by axis; without arguments end the plane."""
+        self.check_alone(code)
         arguments = [argument.strip() for argument in self.arguments.split(",")]
         if self.programmed is not None or (self.tcp and not self.is_tilted) or self.letters:
             self.refuse(code, "expected no axes, and TRANS without axes and TRAFOOF before")
