@@ -287,8 +287,11 @@ class Interpreter(Cycles):
                 claimed |= {"I", "J"}
         for letter, value in self.words.items():
             word = f"{letter}{value:g}"
-            if letter in CORNERS and not self.words.keys() & self.index.keys():
-                self.refuse(word, "expected a move in its block")
+            corners = CORNERS & self.words.keys()
+            if letter in corners and (
+                len(corners) > 1 or not self.words.keys() & self.index.keys()
+            ):
+                self.refuse(word, "expected one corner and a move in its block")
             if letter in _AXES and letter not in self.index and letter not in claimed:
                 axes = f"{self.scene.machine.chain}: {', '.join(self.index)}"
                 self.refuse(word, f"expected an axis of {axes}")
@@ -372,8 +375,9 @@ class Interpreter(Cycles):
         """Find the subprogram that a block calls: code, start, repetitions, and line after it."""
         for other in codes[1:]:
             self.refuse(other, f"expected it in another block than {codes[0]}")
-        self.uncorrectable |= {self.line: code for code in codes}
-        if codes in ([], ["M99"]):
+        if codes:
+            self.uncorrectable.setdefault(self.line, codes[0])
+        if not codes or codes[0] == "M99":
             return None
         (code,) = codes
         kind, number, repeats = "NO"[code == "M98"], self.words.get("P", 0.0), self.count("L")

@@ -56,9 +56,8 @@ class Motion(Frames):
         self.record(kind)
         for letter in CORNERS & self.words.keys():
             is_tilted = self.frame is not None and abs(self.frame[self.across, self.across]) < 1.0
-            if kind != FEED or self.tcp or is_tilted or self.corner:
-                expected = "one corner of G1, without tool centre point or tilted plane"
-                self.refuse(letter, f"expected {expected}")
+            if kind != FEED or self.tcp or is_tilted:
+                self.refuse(letter, "expected a move of G1 in the plane, without tool centre point")
             self.corner = letter, self.value(letter), len(self.rows) // self.width - 1
         if bare:
             self.switch(tcp=tcp, length_mm=self.length_mm)
