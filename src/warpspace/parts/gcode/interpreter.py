@@ -311,12 +311,12 @@ class Interpreter(Cycles):
             self.check_letters(motion)
         if "H" in self.words and not WITH_H & {*self.codes}:
             self.remarks.setdefault(f"H{self.words['H']:g} without G43", self.line)
-        if self.words.keys() & _AXES:
-            for code in self.codes:
-                if code not in self.handlers and self.motionless[code].endswith(NO_AXES):
-                    self.refuse(code, "expected no axis in its block")
         # X of G4 is a time
-        self.letters = set[str]() if self.once == "G4" else self.words.keys() & _AXES
+        axes = self.words.keys() & _AXES
+        self.letters = set[str]() if self.once == "G4" else axes
+        for code in self.codes if axes else ():
+            if code not in self.handlers and self.motionless[code].endswith(NO_AXES):
+                self.refuse(code, "expected no axis in its block")
         if self.dialect == "sinumerik" and "D" in self.words:
             self.compensate("D")
         for code in self.codes:
@@ -325,7 +325,8 @@ class Interpreter(Cycles):
         self.cycle = self.cycle if self.motion in CYCLES else {}
         if self.corner and (self.once or (self.letters and self.motion != "G1")):
             self.refuse(self.once or self.motion, f"expected G1 after a corner {self.corner[0]}")
-        subprogram = self.find_subprogram([code for code in self.codes if code in CALLS])
+        calls = [code for code in self.codes if code in CALLS]
+        subprogram = self.find_subprogram(calls) if calls else None
         is_arc = self.motion in {"G2", "G3"} and self.words.keys() & {*"IJKR"}
         if self.once in {"G28", "G30"}:
             self.move_home()
@@ -375,11 +376,10 @@ class Interpreter(Cycles):
         """Find the subprogram that a block calls: code, start, repetitions, and line after it."""
         for other in codes[1:]:
             self.refuse(other, f"expected it in another block than {codes[0]}")
-        if codes:
-            self.uncorrectable.setdefault(self.line, codes[0])
-        if not codes or codes[0] == "M99":
+        code = codes[0]
+        self.uncorrectable.setdefault(self.line, code)
+        if code == "M99":
             return None
-        (code,) = codes
         kind, number, repeats = "NO"[code == "M98"], self.words.get("P", 0.0), self.count("L")
         if (kind, number) not in self.labels and "L" not in self.words:
             repeats, number = max(int(number) // 10_000, 1), number % 10_000
