@@ -351,26 +351,23 @@ class Interpreter(Cycles):
             self.refuse(f"O{name} {word}", f"expected O{name} {partner}, [number] with REPEAT")
         if other is None:
             self.leave()
-        elif word == "SUB" or (count and not int(count)):
+        elif word == "SUB":
             self.next_line = at
         else:
             start, caller = (at, self.next_line) if word == "CALL" else (self.next_line, at)
             self.enter(word, start, int(count or 1), caller)
 
     def enter(self, word: str, start: int, repeats: int, caller: int) -> None:
-        """Continue at a subprogram."""
+        """Continue at a subprogram, or after it."""
         if len(self.calls) >= MAX_CALLS:
             self.refuse(word, f"expected at most {MAX_CALLS} subprograms within each other")
-        if repeats:
-            self.calls.append((start, repeats - 1, caller))
-            self.next_line = start
-
-    def leave(self) -> None:
-        """Repeat a subprogram, continue after its call, or end the program."""
-        start, repeats, caller = self.calls.pop() if self.calls else (0, 0, MAX_LINES)
         self.next_line = start if repeats else caller
         if repeats:
             self.calls.append((start, repeats - 1, caller))
+
+    def leave(self) -> None:
+        """Repeat a subprogram, continue after its call, or end the program."""
+        self.enter("M99", *(self.calls.pop() if self.calls else (0, 0, MAX_LINES)))
 
     def find_subprogram(self, codes: Sequence[str]) -> tuple[str, int, int, int] | None:
         """Find the subprogram that a block calls: code, start, repetitions, and line after it."""
