@@ -140,8 +140,8 @@ FOREIGN = (
     "MIRROR X0", "R30", "L2", "I5", "M99", "endsub", "SUPA", "G234", "TRAFOOF", "ATRANS X1", "K1",
 )  # fmt: skip
 OTHERS = {
-    *("M0", "M3", "M5", "G2", "G3", "G4", "G8", "G9", "M9", "G28", "G53", "G54", "G69", "G80", "G234"),
-    *("TRAORI", "TRAFOOF", "SUPA"),
+    *("M0", "M3", "M5", "M9", "G2", "G3", "G4", "G9", "G28", "G53", "G54", "G69", "G80"),
+    *("G234", "TRAORI", "TRAFOOF", "SUPA"),
 }
 WORD = re.compile(
     r"\s*(?:(TRAORI|TRAFOOF|SUPA|A?(?:TRANS|ROT|MIRROR))(?![A-Z])|(CYCLE800)\(([^()]*)\)|(,[RC])\s*|((?:RND|CHR|CHF|RPL)"
@@ -447,7 +447,8 @@ class Reference:
             length = size * tan(angle / 2)
         elif name == "CHF":
             length = size / (2 * cos(angle / 2))
-        if arrival[2] or departure[2] or angle > pi - 1e-9 or length > min(before, after) or size <= 0:
+        is_flat = not arrival[2] and not departure[2] and angle < pi - 1e-9
+        if not is_flat or length > min(before, after) or size <= 0:
             raise RefusalError
         yield at - length * arrival / before
         yield at + length * departure / after

@@ -322,6 +322,8 @@ class Interpreter(Cycles):
         for code in self.codes:
             if code in self.handlers:
                 self.handlers[code](self, code)
+            elif code in {"G5", "G8"} and "P" not in self.words:
+                self.refuse(code, "expected P")
         self.cycle = self.cycle if self.motion in CYCLES else {}
         if self.corner and (self.once or (self.letters and self.motion != "G1")):
             self.refuse(self.once or self.motion, f"expected G1 after a corner {self.corner[0]}")
