@@ -115,7 +115,7 @@ def test_a_ball_bar_reads_distances_on_the_part(machine, plane):
     text = "direction,angle_deg,radial_um\n" + "\n".join(rows)
     result = run_test(scene, test, parse_table(text, test.data_columns(scene), "bar.csv"))
     measured = result.measured.outcome
-    for name in ("circular_deviation_um", "scale_difference_um"):
+    for name in ("circular_deviation_um", "radius_difference_um"):
         assert measured[name] == pytest.approx(run.outcome[name], abs=0.1, rel=1e-3), name
     angle = run.outcome["squareness_urad"]  # 0.05 µm at a radius of 60 mm
     assert measured["squareness_urad"] == pytest.approx(angle, abs=2.0, rel=1e-3)
