@@ -652,7 +652,6 @@ def step_box(x, y, z, unit):
 @pytest.mark.parametrize(("unit", "mm"), [(".MILLI.", 1.0), ("$", 1000.0), (".CENTI.", 10.0)])
 @pytest.mark.parametrize("ending", ["step", "stp"])
 def test_a_step_file_has_its_own_unit(unit, mm, ending):
-    pytest.importorskip("cascadio")
     mesh, notes = read_mesh(Path(f"a.{ending}"), None, data=step_box(30, 20, 10, unit))
     assert (notes, len(mesh.faces)) == ((), 12)
     np.testing.assert_allclose(mesh.bounds, mm * np.array([(0, 0, 0), (30, 20, 10)]), rtol=1e-6)
