@@ -226,6 +226,22 @@ def test_deviations_are_read_along_programmed_directions(machine, axis, sensed, 
 
 
 @CHAINS
+@given(machines(rotary=2), st.lists(MICRO, min_size=4, max_size=4))
+def test_angles_of_rotary_axes_are_read_about_programmed_directions(machine, angles):
+    for axis in (body.name for body in machine.bodies if not body.is_linear):
+        low, high = machine.workspace[axis]
+        targets = np.round(np.linspace(low, max(high, low + 1.0), 4), 3)
+        rows = "\n".join(f"{at},{urad}" for at, urad in zip(targets, angles, strict=True))
+        scene = imported(machine, f"{axis} [deg],E{axis[0]}{axis} [urad]\n{rows}", "a.csv", "csv")
+        table = tuple(
+            (float(at), float(scene.errors.evaluate_at(f"E{axis[0]}{axis}", {axis: at})))
+            for at in targets
+        )
+        read = with_errors(machine, {f"E{axis[0]}{axis}": table}).angle_urad(axis, axis, targets)
+        assert read == pytest.approx(np.array(angles) - angles[0], **ROUNDING)
+
+
+@CHAINS
 @given(machines(), st.sampled_from(PAIRS), st.integers(-3000, 3000).map(lambda n: n * 1e-6))
 def test_skew_factors_are_the_error_that_they_correct(machine, plane, factor):
     letter = dict(zip(PAIRS, "IJK", strict=True))[plane]
