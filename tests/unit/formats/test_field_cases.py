@@ -55,7 +55,10 @@ ENC = [
         (["%_N_NC_EEC_INI", ";$PATH=/_N_NCK_DIR", *ENC, "M2"], ""),
         ([line.replace("MODULO[1,X]=0", "MODULO[1,X]=FALSE") for line in ENC], ""),
         ([" ".join(ENC[1:3]), *ENC[3:]], ""),
-        ([line.replace("=", "  ") for line in ENC], "10 assignments without =, the first in line 2"),
+        (
+            [line.replace("=", "  ") for line in ENC],
+            "10 assignments without =, the first in line 2",
+        ),
         (
             [line.replace("MODULO[1,X]=0", "MODULO[1,X]=-1") for line in ENC],
             "line 11: $AA_ENC_COMP_IS_MODULO is -1: the table does not repeat",
@@ -198,9 +201,7 @@ SAVED = "#*# [skew_correction {}]\n#*# xy_skew = 0.0026107\n#*# xz_skew = {}\n#*
 
 
 def test_klipper_saved_factors():
-    assert read(SAVED.format("CaliFlower", 0.0, 0.0)).constants == pytest.approx(
-        {"EC0Y": -2610.7}
-    )
+    assert read(SAVED.format("CaliFlower", 0.0, 0.0)).constants == pytest.approx({"EC0Y": -2610.7})
     guarded = "{% if 'skew_correction default' in printer.configfile.settings %}\n"
     text = f"[gcode_macro START]\ngcode:\n    {guarded}      SKEW_PROFILE LOAD=default\n"
     factors = (0.0026107, -0.0011, 0.0008)  # x moves by -y·XY - z·(XZ - XY·YZ)
@@ -385,7 +386,9 @@ def test_linuxcnc_guides_without_their_distance_or_file(names, has_machine, mess
 
 def test_linuxcnc_corrections_in_inches():
     """Type 1 adds its numbers: 1.0 0.002 -0.003 in inches is -50.8 and +76.2 µm at 25.4 mm."""
-    ini = COMP["g.ini"].replace("= mm", "= inch").replace("COMP_FILE_TYPE = 0", "COMP_FILE_TYPE = 1")
+    ini = (
+        COMP["g.ini"].replace("= mm", "= inch").replace("COMP_FILE_TYPE = 0", "COMP_FILE_TYPE = 1")
+    )
     sources = [source_of_text(ini, "g.ini")]
     sources.append(source_of_text("1.0 0.002 -0.003\n2.0 0.001 -0.002\n", "x.comp"))
     (exx,) = read_errors(sources, ReadOptions()).imported.series
