@@ -423,9 +423,83 @@ NAMED = {
     "a HEIDENHAIN digital readout": "#\nND-280 MM\nAXIS X1 = 0\n",
     "an EasyRoute control": "unit = mm\n[X]\n0, 0.000, 0.010\n",
     "a screw map of Mach3": "-10.0,-10.001\n0,0\n10,10.002\n",
-    "a compensation value list of ISG": "kopf.log_achs_nr 2\nkw.ssfk.unit 1\n",
+    "a list of cross or plane compensation of ISG": "kopf.achs_nr 2\nkw.crosscomp.unit 1\n",
     "a bed mesh of Klipper": "[bed_mesh]\n",
 }
+
+
+BC = load_scene("machine_trunnion_bc").machine
+ISG = """# list of the Y axis
+kopf.log_achs_nr      2
+kopf.log_achs_name    Y-ACHSE
+kw.ssfk.interval      0
+kw.ssfk.kw_nr_max     3
+kw.ssfk.unit          1   /* 0: increments 1: metric */
+kw.ssfk.bilateral     1
+kw.ssfk.table[0].setpoint -200000
+kw.ssfk.table[1].setpoint -199306
+kw.ssfk.table[2].setpoint -198667
+kw.ssfk.table[0].pos  0
+kw.ssfk.table[1].pos  24
+kw.ssfk.table[2].pos  -102
+kw.ssfk.table[0].neg  0
+kw.ssfk.table[1].neg  67
+kw.ssfk.table[2].neg  80
+"""
+EQUAL_STEPS = (
+    ISG.replace("interval      0", "interval      20000\nkw.ssfk.kw_startpos   -909000")
+    .replace("bilateral     1", "bilateral     0")
+    .replace("Y-ACHSE", "X_ACHSE")
+)
+EQUAL_STEPS = "\n".join(line for line in EQUAL_STEPS.splitlines() if not line.count("].neg"))
+
+
+def test_isg_lists_in_both_directions():
+    """The example of TF5200: programmed 19866.7 µm, measured 10.2 µm less is -102."""
+    imported = read(ISG, "achskw2.lis")
+    (eyy,) = imported.series
+    assert eyy.key == "EYY"
+    assert eyy.positions == pytest.approx((-20.0, -19.9306, -19.8667))
+    assert eyy.in_direction(FORWARD) == pytest.approx([0.0, 2.4, -10.2])
+    assert eyy.in_direction(BACKWARD) == pytest.approx([0.0, 6.7, 8.0])
+    assert any("actual − nominal" in text for text in imported.assumed)
+    (reversed_sign,) = read(ISG, "achskw2.lis", sign="correction").series
+    assert reversed_sign.in_direction(FORWARD) == pytest.approx([0.0, -2.4, 10.2])
+
+
+def test_isg_lists_with_equal_steps_in_one_direction():
+    (exx,) = read(EQUAL_STEPS, "x.lis").series
+    assert (exx.key, exx.positions) == ("EXX", pytest.approx((-90.9, -88.9, -86.9)))
+    assert exx.reversal is None
+    assert exx.values == pytest.approx([0.0, 2.4, -10.2])
+    (ecc,) = read(EQUAL_STEPS.replace("X_ACHSE", "C AXIS"), "c.lis", machine=BC).series
+    assert ecc.values == pytest.approx(np.array([0.0, 0.0024, -0.0102]) * np.pi / 180.0 * 1e6)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("unit          1", "unit          0", "line 6: unit 0: increments .*; expected unit 1"),
+        ("kw.ssfk.unit", "kw.ssfk.unity", "has no kw.ssfk.unit"),
+        ("bilateral     1", "bilateral     0", "line 14: values in the negative direction"),
+        ("nr_max     3", "nr_max     4", r"has no table\[3\].setpoint; expected 4 entries"),
+        (
+            "nr_max     3",
+            "nr_max     2",
+            r"line 10: table\[2\].setpoint; expected an index below 2",
+        ),
+        ("-199306", "-200306", "line 9: position -20.0306 after -20"),
+        ("pos  24", "pos  2,4", "line 12: pos '2,4' has a decimal comma"),
+        ("[1].pos  24", "[0].pos  24", r"line 12: kw.ssfk.table\[0\].pos is repeated"),
+        ("[1].pos  24", "[1].pso  24", r"line 12: table\[1\].pso is unknown"),
+        ("[1].pos  24", "[1].pos", "line 12: .*; expected kw.ssfk.NAME NUMBER"),
+        ("Y-ACHSE", "Spindel", "line 3: axis 'SPINDEL' is unknown"),
+    ],
+)
+def test_isg_lists_that_are_not_understood_are_refused(before, after, message):
+    assert before in ISG
+    with pytest.raises(SceneError, match=message):
+        read(ISG.replace(before, after), "y.lis")
 
 
 @pytest.mark.parametrize("title", NAMED)
