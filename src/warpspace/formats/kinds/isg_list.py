@@ -96,25 +96,24 @@ def _table(source: Source, options: ReadOptions, notes: list[str]) -> AxisTable:
         entries = (columns[name][i] for i in range(count))
         return np.array([at.number(text, name) for at, text in entries]) * RESOLUTION
 
+    if columns["neg"] and not is_bilateral:
+        at = next(iter(columns["neg"].values()))[0]
+        at.refuse("values in the negative direction of a unilateral list", "bilateral 1")
     if interval:
         start = setting("kw_startpos", -MAX_POSITION, MAX_POSITION)
         places = (start + interval * np.arange(count)) * RESOLUTION
     else:
         places = column("setpoint")
-    if columns["neg"] and not is_bilateral:
-        at = next(iter(columns["neg"].values()))[0]
-        at.refuse("values in the negative direction of a unilateral list", "bilateral 1")
-    for i in range(count):
-        at = columns["setpoint"].get(i, columns["pos"].get(i, (source.at(1), "")))[0]
-        at.checked_position(float(places[i]), "position")
-        if i:
-            at.ascending(float(places[i]), float(places[i - 1]), "position")
     factor = options.factor(ERROR)
-    forward, backward = (
-        tuple((factor * column(name)).tolist()) if name == "pos" or is_bilateral else ()
-        for name in ("pos", "neg")
-    )
-    return AxisTable(axis, axis, tuple(places.tolist()), forward, backward=backward)
+    forward = factor * column("pos")
+    backward = factor * column("neg") if is_bilateral else np.zeros(0)
+    for i, place in enumerate(places.tolist()):
+        at, _ = columns["pos" if interval else "setpoint"][i]
+        at.checked_position(place, "position")
+        if i:
+            at.ascending(place, float(places[i - 1]), "position")
+    positions, values, reverse = (tuple(row.tolist()) for row in (places, forward, backward))
+    return AxisTable(axis, axis, positions, values, backward=reverse)
 
 
 def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
