@@ -19,108 +19,101 @@ RESOLUTION = 1e-4  # mm or degrees per unit
 MAX_ROWS = 10_000
 MAX_POSITION = 10**12
 SIGN = "values are errors, actual − nominal, which the control subtracts"
-SETTINGS = ("interval", "kw_startpos", "kw_nr_max", "unit", "bilateral", "modulo")
-COLUMNS = ("setpoint", "pos", "neg")
-_ENTRY = re.compile(r"(kopf|kw\.ssfk)\.(\w+|table\[(\d{1,6})\]\.(\w+))\s+(\S.*)")
-_AXIS = re.compile(r"([XYZABCUVW]\d?)[-_ ]?(?:ACHSE|AXIS)", re.IGNORECASE)
-Entry = tuple[SourceLine, str]
+PREFIX = "kw.ssfk."
+AXIS = "kopf.log_achs_name"
+READ_KEYS = (AXIS, *(
+    PREFIX + name
+    for name in ("interval", "kw_startpos", "kw_nr_max", "unit", "bilateral", "modulo", "table[")
+))  # fmt: skip
+_ENTRY = re.compile(r"((?:kopf|kw)\.\S+)\s+(\S.*)")
+_AXIS_NAME = re.compile(r"([XYZABCUVW]\d?)[-_ ]?(?:ACHSE|AXIS)", re.IGNORECASE)
+Entries = dict[str, tuple[SourceLine, str]]
 
 
-def _entries(
-    source: Source, notes: list[str]
-) -> tuple[dict[str, Entry], dict[str, dict[int, Entry]]]:
-    """Read the settings, and the columns of the table by index."""
-    settings: dict[str, Entry] = {}
-    columns: dict[str, dict[int, Entry]] = {name: {} for name in COLUMNS}
+def _entries(source: Source, notes: list[str]) -> Entries:
+    entries: Entries = {}
     unread: list[SourceLine] = []
     for at, bare in source.scan("#", "/*"):
         match = _ENTRY.fullmatch(bare)
-        if match is None:
-            if bare.startswith("kw.ssfk."):
-                at.refuse(at.quoted, "kw.ssfk.NAME NUMBER")
+        if match is None and bare.startswith(PREFIX):
+            at.refuse(at.quoted, f"{PREFIX}NAME NUMBER")
+        if match is None or not match[1].startswith(READ_KEYS):
             unread.append(at)
-            continue
-        group, key, index, column, text = match.groups()
-        if index and column not in COLUMNS:
-            at.refuse(f"{key} is unknown", f"one of {', '.join(COLUMNS)}")
-        if not index and key not in SETTINGS and group != "kopf":
-            unread.append(at)
-            continue
-        place, table = (int(index), columns[column]) if index else (key, settings)
-        if place in table:
-            at.refuse(f"{group}.{key} is repeated", "it once")
-        table[place] = (at, text.strip())  # pyright: ignore[reportArgumentType]
+        elif match[1] in entries:
+            at.refuse(f"{match[1]} is repeated", "it once")
+        else:
+            entries[match[1]] = (at, match[2])
     notes += unread_notes(unread)
-    return settings, columns
+    return entries
 
 
-def _axis(source: Source, settings: dict[str, Entry], options: ReadOptions) -> str:
-    if options.axis or "log_achs_name" not in settings:
-        return options.axis_of_file(source, "kopf.log_achs_name, or --axis X")
-    at, name = settings["log_achs_name"]
-    match = _AXIS.fullmatch(name)
+def _axis(source: Source, entries: Entries, options: ReadOptions) -> str:
+    if options.axis or AXIS not in entries:
+        return options.axis_of_file(source, f"{AXIS}, or --axis X")
+    at, name = entries[AXIS]
+    match = _AXIS_NAME.fullmatch(name)
     is_assigned = name.upper() in options.names
     return options.axis_named(match[1] if match and not is_assigned else name, at)
 
 
 def _table(source: Source, options: ReadOptions, notes: list[str]) -> AxisTable:
-    settings, columns = _entries(source, notes)
+    entries = _entries(source, notes)
 
-    def setting(name: str, low: int, high: int, default: int | None = None) -> int:
-        if name not in settings:
-            if default is None:
-                source.refuse(f"has no kw.ssfk.{name}", f"kw.ssfk.{name} NUMBER")
-            return default
-        at, text = settings[name]
-        return at.integer(text, f"kw.ssfk.{name}", low, high)
+    def setting(name: str, low: int, high: int, *, default: int | None = None) -> int:
+        key = PREFIX + name
+        if key not in entries and default is None:
+            source.refuse(f"has no {key}", f"{key} NUMBER")
+        at, number = entries.get(key, (source.at(1), str(default)))
+        return at.integer(number, key, low, high)
 
-    axis = _axis(source, settings, options)
+    axis = _axis(source, entries, options)
     if not setting("unit", 0, 1):
-        settings["unit"][0].refuse(
-            "unit 0: increments of the encoder, whose size is not in the file", "unit 1, 0.1 µm"
-        )
-    if setting("modulo", 0, 1, 0):
-        settings["modulo"][0].refuse("modulo 1: the period is not in the file", "modulo 0")
+        problem = "unit 0: increments of the encoder, whose size is not in the file"
+        entries[f"{PREFIX}unit"][0].refuse(problem, "unit 1, 0.1 µm")
+    if setting("modulo", 0, 1, default=0):
+        problem = "modulo 1: the period is not in the file"
+        entries[f"{PREFIX}modulo"][0].refuse(problem, "modulo 0")
     count = setting("kw_nr_max", 2, MAX_ROWS)
     interval = setting("interval", 0, MAX_POSITION)
-    is_bilateral = bool(setting("bilateral", 0, 1, 0))
+    names = ["pos"] if interval else ["setpoint", "pos"]
+    names += ["neg"] if setting("bilateral", 0, 1, default=0) else []
+    keys = {name: [f"{PREFIX}table[{index}].{name}" for index in range(count)] for name in names}
+    table_keys = {key for column in keys.values() for key in column}
+    for key, (at, _) in entries.items():
+        if "[" in key and key not in table_keys:
+            expected = f"{' and '.join(names)} with an index below {count}, for interval {interval}"
+            at.refuse(f"{key} is not used", expected)
 
     def column(name: str) -> np.ndarray:
-        missing = next((i for i in range(count) if i not in columns[name]), None)
-        excess = next((i for i in sorted(columns[name]) if i >= count), None)
-        if missing is not None:
-            source.refuse(f"has no table[{missing}].{name}", f"{count} entries, kw_nr_max")
-        if excess is not None:
-            at = columns[name][excess][0]
-            at.refuse(f"table[{excess}].{name}", f"an index below {count}, kw_nr_max")
-        entries = (columns[name][i] for i in range(count))
-        return np.array([at.number(text, name) for at, text in entries]) * RESOLUTION
+        missing = next((key for key in keys[name] if key not in entries), "")
+        if missing:
+            source.refuse(f"has no {missing}", f"{count} points, kw_nr_max")
+        return RESOLUTION * np.array(
+            [at.number(number, name) for at, number in map(entries.__getitem__, keys[name])]
+        )
 
-    if columns["neg"] and not is_bilateral:
-        at = next(iter(columns["neg"].values()))[0]
-        at.refuse("values in the negative direction of a unilateral list", "bilateral 1")
     if interval:
         start = setting("kw_startpos", -MAX_POSITION, MAX_POSITION)
         places = (start + interval * np.arange(count)) * RESOLUTION
     else:
         places = column("setpoint")
     factor = options.factor(ERROR)
-    forward = factor * column("pos")
-    backward = factor * column("neg") if is_bilateral else np.zeros(0)
-    for i, place in enumerate(places.tolist()):
-        at, _ = columns["pos" if interval else "setpoint"][i]
-        at.checked_position(place, "position")
-        if i:
-            at.ascending(place, float(places[i - 1]), "position")
-    positions, values, reverse = (tuple(row.tolist()) for row in (places, forward, backward))
-    return AxisTable(axis, axis, positions, values, backward=reverse)
+    forward, backward = (
+        tuple((factor * column(name)).tolist()) if name in names else () for name in ("pos", "neg")
+    )
+    before = -np.inf
+    for place, key in zip(places.tolist(), keys[names[0]], strict=True):
+        at, _ = entries[key]
+        at.ascending(at.checked_position(place, "position"), before, "position")
+        before = place
+    return AxisTable(axis, axis, tuple(places.tolist()), forward, backward=backward)
 
 
 def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     notes: list[str] = []
     (source,) = sources  # each file is a list of its own
-    table = _table(source, options, notes)
-    return Tables((table,), (options.sign_statement(SIGN),), tuple(notes), ("0.1 µm", "0.0001°"))
+    assumed = (options.sign_statement(SIGN),)
+    return Tables((_table(source, options, notes),), assumed, tuple(notes), ("0.1 µm", "0.0001°"))
 
 
 FORMATS = (

@@ -382,12 +382,12 @@ def _read_marlin(
 def _parameters(at: SourceLine, command: str, letters: Collection[str]) -> dict[str, float]:
     """Read the letters of a command with their numbers, each once."""
     name, text = command[:4], command[4:]
-    words = _WORD.findall(text)
-    numbers = {letter: at.number(number, f"{name} {letter}") for letter, number in words}
+    parameters = _WORD.findall(text)
+    numbers = {letter: at.number(number, f"{name} {letter}") for letter, number in parameters}
     is_unknown = _WORD.sub("", text).strip() or not numbers.keys() <= {*letters}
-    if is_unknown or len(numbers) < len(words):
-        *others, last = letters
-        at.refuse(at.quoted, f"{name} with {', '.join(others)} or {last}, each once")
+    if is_unknown or len(numbers) < len(parameters):
+        *before, last = letters
+        at.refuse(at.quoted, f"{name} with {', '.join(before)} or {last}, each once")
     return numbers
 
 
