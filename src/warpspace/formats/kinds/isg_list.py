@@ -25,7 +25,7 @@ READ_KEYS = (AXIS, *(
     PREFIX + name
     for name in ("interval", "kw_startpos", "kw_nr_max", "unit", "bilateral", "modulo", "table[")
 ))  # fmt: skip
-_ENTRY = re.compile(r"((?:kopf|kw)\.\S+)\s+(\S.*)")
+_SETTING = re.compile(r"((?:kopf|kw)\.\S+)\s+(\S.*)")
 _AXIS_NAME = re.compile(r"([XYZABCUVW]\d?)[-_ ]?(?:ACHSE|AXIS)", re.IGNORECASE)
 Entries = dict[str, tuple[SourceLine, str]]
 
@@ -34,7 +34,7 @@ def _entries(source: Source, notes: list[str]) -> Entries:
     entries: Entries = {}
     unread: list[SourceLine] = []
     for at, bare in source.scan("#", "/*"):
-        match = _ENTRY.fullmatch(bare)
+        match = _SETTING.fullmatch(bare)
         if match is None and bare.startswith(PREFIX):
             at.refuse(at.quoted, f"{PREFIX}NAME NUMBER")
         if match is None or not match[1].startswith(READ_KEYS):
