@@ -115,7 +115,7 @@ def test_a_ball_bar_reads_distances_on_the_part(machine, plane):
     text = "direction,angle_deg,radial_um\n" + "\n".join(rows)
     result = run_test(scene, test, parse_table(text, test.data_columns(scene), "bar.csv"))
     measured = result.measured.outcome
-    for name in ("circular_deviation_um", "scale_difference_um"):
+    for name in ("circular_deviation_um", "radius_difference_um"):
         assert measured[name] == pytest.approx(run.outcome[name], abs=0.1, rel=1e-3), name
     angle = run.outcome["squareness_urad"]  # 0.05 µm at a radius of 60 mm
     assert measured["squareness_urad"] == pytest.approx(angle, abs=2.0, rel=1e-3)
@@ -223,6 +223,22 @@ def test_deviations_are_read_along_programmed_directions(machine, axis, sensed, 
         places = {**machine.middle, axis: targets}
         field = evaluate(scene, at=places, frame="workpiece", loop="relative")
         assert field.error_um == pytest.approx(np.outer(deviations, along), abs=1e-6)
+
+
+@CHAINS
+@given(machines(rotary=2), st.lists(MICRO, min_size=4, max_size=4))
+def test_angles_of_rotary_axes_are_read_about_programmed_directions(machine, angles):
+    for axis in (body.name for body in machine.bodies if not body.is_linear):
+        low, high = machine.workspace[axis]
+        targets = np.round(np.linspace(low, max(high, low + 1.0), 4), 3)
+        rows = "\n".join(f"{at},{urad}" for at, urad in zip(targets, angles, strict=True))
+        scene = imported(machine, f"{axis} [deg],E{axis[0]}{axis} [urad]\n{rows}", "a.csv", "csv")
+        table = tuple(
+            (float(at), float(scene.errors.evaluate_at(f"E{axis[0]}{axis}", {axis: at})))
+            for at in targets
+        )
+        read = with_errors(machine, {f"E{axis[0]}{axis}": table}).angle_urad(axis, axis, targets)
+        assert read == pytest.approx(np.array(angles) - angles[0], **ROUNDING)
 
 
 @CHAINS

@@ -124,7 +124,16 @@ Run Target Data:
 2 2 1.0
 2 1 0.0
 """
+ISG_LIST = """kopf.log_achs_name Y-ACHSE
+kw.ssfk.interval 100000
+kw.ssfk.kw_startpos -200000
+kw.ssfk.kw_nr_max 2
+kw.ssfk.unit 1
+kw.ssfk.table[0].pos 0
+kw.ssfk.table[1].pos -102
+"""
 READ_ONLY = {
+    "isg-list": b"%% y.lis\n" + ISG_LIST.encode(),
     "rtl": b"%% x.rtl\n" + RTL.encode(),
     "reprapfirmware": b"%% config.g\nM556 S100 X0.7 Y-0.2 Z0.6\n",
 }

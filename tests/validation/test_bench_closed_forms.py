@@ -35,8 +35,10 @@ STRAIGHTNESS = ("end_points_um", "least_squares_um", "minimum_zone_um")
 CLOSED_FORMS = [
     # 11 µm over 550 mm: 4 µm more at +x and −4 at −x, so 4 cos²φ = 2 + 2 cos 2φ
     ({"EXX": RAMP}, Circular(radius_mm=200.0),
-     {"radius_um": 2.0, "scale_difference_um": 2.0, "circular_deviation_um": 4.0,
+     {"radius_um": 2.0, "radius_difference_um": 4.0, "circular_deviation_um": 4.0,
       "squareness_urad": 0.0}),
+    # 100 µm/m over a radius of 150 mm: 15 µm
+    ({"EXX": ("ramp", 55.0)}, Circular(radius_mm=150.0), {"radius_difference_um": 15.0}),
     ({"EC0Y": 30.0}, Circular(radius_mm=150.0, end_deg=180.0, points=181),
      {"squareness_urad": 30.0}),
     ({"EXX": backlash(6.0)}, Diagonals(),

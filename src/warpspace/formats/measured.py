@@ -205,7 +205,7 @@ def errors_of_readings(imported: ImportedErrors, machine: Machine | None) -> Imp
     """Convert readings along programmed directions to the errors of the bodies that move.
 
     The key of a reading names the axis that moves and the direction that is sensed, as programmed.
-    Constants, and errors of rotary axes, are those of the bodies already.
+    Constants, and errors of rotary axes except their own angle, are those of the bodies already.
     """
     return _converted(imported, machine, _reading_shares) if machine else imported
 
@@ -238,7 +238,9 @@ def _converted(
 
 def _reading_shares(machine: Machine, row: Parameter) -> Mapping[str, float]:
     sensed = "XYZ"[row.direction]
-    if not is_linear(row.axis) or not {row.axis, sensed} <= machine.axes.keys():
+    if not is_linear(row.axis):
+        sensed = row.axis if row.letter == row.axis[0] else ""
+    if not {row.axis, sensed} <= machine.axes.keys():
         return {row.key: 1.0}
     return reading_errors(machine, row.axis, sensed, angle=row.is_rotation)
 

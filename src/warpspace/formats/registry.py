@@ -162,7 +162,10 @@ def parse_axis_options(texts: Sequence[str]) -> tuple[str, dict[str, str]]:
     return axis, names
 
 
-_KINDS = ["csv_own", "volumetric", "rtl", "sinumerik", "heidenhain", "fanuc_3d", "linuxcnc", "skew"]
+_KINDS = (
+    "csv_own", "volumetric", "rtl", "sinumerik", "heidenhain", "fanuc_3d", "isg_list", "linuxcnc",
+    "skew",
+)  # fmt: skip
 
 
 @cache

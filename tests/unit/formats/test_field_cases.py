@@ -1,6 +1,7 @@
 """Files as they are found in the shop, after public bug reports and manuals, with their numbers."""
 
 import io
+import re
 import zipfile
 from dataclasses import replace
 
@@ -36,10 +37,13 @@ def read(text, name="file.txt", **options):
 
 ENC = [
     "CHANDATA(1)",
-    *(f"$AA_ENC_COMP[1,{i},X]={v}" for i, v in enumerate((0, 0.0031, 0.0058, 0.0092))),
+    *(
+        f"$AA_ENC_COMP[1,{i},X]={v}"
+        for i, v in enumerate((0, 0.0031, 0.0058, 0.0092, 0.0121, 0.015))
+    ),
     "$AA_ENC_COMP_STEP[1,X]=100",
     "$AA_ENC_COMP_MIN[1,X]=-500",
-    "$AA_ENC_COMP_MAX[1,X]=-200",
+    "$AA_ENC_COMP_MAX[1,X]=0",
     "$AA_ENC_COMP_IS_MODULO[1,X]=0",
 ]
 
@@ -52,27 +56,31 @@ ENC = [
         (["%_N_NC_EEC_INI", ";$PATH=/_N_NCK_DIR", *ENC, "M2"], ""),
         ([line.replace("MODULO[1,X]=0", "MODULO[1,X]=FALSE") for line in ENC], ""),
         ([" ".join(ENC[1:3]), *ENC[3:]], ""),
-        ([line.replace("=", "  ") for line in ENC], "8 assignments without =, the first in line 2"),
+        (
+            [line.replace("=", "  ") for line in ENC],
+            "10 assignments without =, the first in line 2",
+        ),
         (
             [line.replace("MODULO[1,X]=0", "MODULO[1,X]=-1") for line in ENC],
-            "line 9: $AA_ENC_COMP_IS_MODULO is -1: the table does not repeat",
+            "line 11: $AA_ENC_COMP_IS_MODULO is -1: the table does not repeat",
         ),
     ],
 )
 def test_sinumerik_programs_around_the_table(lines, note):
     imported = read("\n".join(lines), "x.ini")
     (exx,) = imported.series
-    assert exx.values == pytest.approx([0.0, 3.1, 5.8, 9.2])
+    assert exx.positions == (-500.0, -400.0, -300.0, -200.0, -100.0, 0.0)
+    assert exx.values == pytest.approx([0.0, 3.1, 5.8, 9.2, 12.1, 15.0])
     assert note in " ".join(imported.notes)
 
 
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        ([*ENC, "$AA_ENC_COMP_STEP[1,X]=50"], r"line 10: \$AA_ENC_COMP_STEP\[1, X\] is repeated"),
-        ([*ENC, "M6"], "line 10: 'M6'; expected"),
+        ([*ENC, "$AA_ENC_COMP_STEP[1,X]=50"], r"line 12: \$AA_ENC_COMP_STEP\[1, X\] is repeated"),
+        ([*ENC, "M6"], "line 12: 'M6'; expected"),
         ([*ENC[:2], ENC[2].replace(".", ","), *ENC[3:]], "line 3: .* has a decimal comma"),
-        ([line.replace("MODULO[1,X]=0", "MODULO[1,X]=MAYBE") for line in ENC], "line 9: .*MAYBE"),
+        ([line.replace("MODULO[1,X]=0", "MODULO[1,X]=MAYBE") for line in ENC], "line 11: .*MAYBE"),
         (
             [line.replace("X]", "C]").replace("LO[1,C]=0", "LO[1,C]=-1") for line in ENC],
             "IS_MODULO is -1; expected 0 or 1 for a rotary axis",
@@ -84,19 +92,76 @@ def test_sinumerik_mutations_are_refused_with_their_line(lines, message):
         read("\n".join(lines), "x.ini")
 
 
-def test_sinumerik_tables_by_direction_with_modulo_minus_one():
+FORWARD_UM = (0.0, -2.1, -4.6, -6.3, -8.8, -10.4)
+BACKWARD_UM = (4.2, 1.9, -0.3, -2.7, -4.9, -6.6)
+
+
+@pytest.mark.parametrize("modulo", ["0", "-1"])
+def test_sinumerik_tables_by_direction(modulo):
     lines: list[str] = []
-    for table, way, values in ((0, 1, (0.0, -0.0021)), (1, -1, (0.0042, 0.0019))):
+    for table, way, values in ((0, 1, FORWARD_UM), (1, -1, BACKWARD_UM)):
         lines += [
             f"$AN_CEC_INPUT_AXIS[{table}]=(X1)", f"$AN_CEC_OUTPUT_AXIS[{table}]=(X1)",
             f"$AN_CEC_STEP[{table}]=100", f"$AN_CEC_MIN[{table}]=-500",
-            f"$AN_CEC_MAX[{table}]=-400", f"$AN_CEC_DIRECTION[{table}]={way}",
-            f"$AN_CEC_IS_MODULO[{table}]=-1",
-            *(f"$AN_CEC[{table},{i}]={v:.6f}" for i, v in enumerate(values)),
+            f"$AN_CEC_MAX[{table}]=0", f"$AN_CEC_DIRECTION[{table}]={way}",
+            f"$AN_CEC_IS_MODULO[{table}]={modulo}",
+            *(f"$AN_CEC[{table},{i}]={v * 1e-3:.6f}" for i, v in enumerate(values)),
         ]  # fmt: skip
     (exx,) = read("\n".join([*lines, "M0", "M17"]), "COMP_X-X_CEC.SPF").series
-    assert exx.in_direction(FORWARD) == pytest.approx([0.0, -2.1])
-    assert exx.in_direction(BACKWARD) == pytest.approx([4.2, 1.9])
+    assert exx.in_direction(FORWARD) == pytest.approx(FORWARD_UM)
+    assert exx.in_direction(BACKWARD) == pytest.approx(BACKWARD_UM)
+    assert np.mean(exx.reversal) == pytest.approx(-3.967, abs=5e-4)
+
+
+RTL = """HEADER::
+File type  : rtl
+TARGET DATA::
+Filetype  : ISO
+Target-count: 6
+Targets :
+0.000  100.000  200.000  300.000  400.000
+500.000
+Flags: 0 {flag} 2 0
+USER-TEXT::
+Date:2024-05-06 10:00:00
+{axis}
+RUNS::
+Run-count:4
+DEVIATIONS::
+Run Target Data:
+{rows}
+EOF::
+"""
+LASER_RUNS = (
+    (0.0, 1.2, 2.1, 3.4, 4.0, 5.2), (-1.0, 0.2, 1.1, 2.4, 3.0, 4.2),
+    (0.2, 1.0, 2.3, 3.2, 4.2, 5.0), (-0.8, 0.0, 1.3, 2.2, 3.2, 4.0),
+)  # fmt: skip
+
+
+def laser_runs(*, unidirectional=False, axis="Axis:X"):
+    runs = [
+        np.zeros(6) if unidirectional and number % 2 else run
+        for number, run in enumerate(LASER_RUNS)
+    ]
+    rows = [f"{n} {t} {um}" for n, run in enumerate(runs, 1) for t, um in enumerate(run, 1)]
+    return RTL.format(flag=int(unidirectional), axis=axis, rows="\n".join(rows))
+
+
+@pytest.mark.parametrize("unidirectional", [True, False])
+def test_laser_runs_in_one_direction_and_in_both(unidirectional):
+    (exx,) = read(laser_runs(unidirectional=unidirectional), "x.rtl").series
+    assert exx.in_direction(FORWARD) == pytest.approx([0.1, 1.1, 2.2, 3.3, 4.1, 5.1])
+    if unidirectional:  # the runs of zeros are empty
+        assert exx.reversal is None
+    else:
+        assert np.mean(exx.reversal) == pytest.approx(1.0)
+
+
+def test_laser_runs_without_an_axis_ask_for_it():
+    text = laser_runs(axis="Location:lab")
+    with pytest.raises(SceneError, match="does not state its axis; expected --axis X"):
+        read(text, "x.rtl")
+    assert read(text, "x.rtl", axis="Y").keys == ("EYY",)
 
 
 def test_heidenhain_columns_without_content():
@@ -133,6 +198,19 @@ def test_klipper_twist_of_both_axes():
     assert any("[bed_mesh]" in note for note in imported.notes)
 
 
+SAVED = "#*# [skew_correction {}]\n#*# xy_skew = 0.0026107\n#*# xz_skew = {}\n#*# yz_skew = {}\n"
+
+
+def test_klipper_saved_factors():
+    assert read(SAVED.format("CaliFlower", 0.0, 0.0)).constants == pytest.approx({"EC0Y": -2610.7})
+    guarded = "{% if 'skew_correction default' in printer.configfile.settings %}\n"
+    text = f"[gcode_macro START]\ngcode:\n    {guarded}      SKEW_PROFILE LOAD=default\n"
+    factors = (0.0026107, -0.0011, 0.0008)  # x moves by -y·XY - z·(XZ - XY·YZ)
+    assert read(text + SAVED.format("default", *factors[1:])).constants == pytest.approx(
+        {"EC0Y": -2610.7, "EB0Z": -1100.0 - 2.6107 * 0.8, "EA0Z": -800.0}
+    )
+
+
 @pytest.mark.parametrize("probe", ["scanner", "cartographer", "bltouch", "dockable_probe"])
 def test_klipper_probes_by_their_offset(probe):
     text = TWIST.replace("probe_eddy_current btt", probe).replace("-20", "0")
@@ -161,6 +239,25 @@ def test_klipper_twist_with_two_probes_is_refused():
 )
 def test_marlin_commands_and_reports(text):
     assert read(text).constants == pytest.approx({"EC0Y": 3540.0})
+
+
+def skew_urad(ac, bd, ad):
+    """Skew of a parallelogram by its diagonals: AC² - BD² = 4·AD·AB·cos."""
+    ab = np.sqrt((ac * ac + bd * bd) / 2.0 - ad * ad)
+    return -1e6 / np.tan(np.arccos((ac * ac - bd * bd) / (4.0 * ad * ab)))
+
+
+@pytest.mark.parametrize(
+    "lengths", [(140.9, 141.4, 100.0), (141.1, 141.6, 100.6), (140.7, 142.2, 99.96)]
+)
+def test_marlin_measured_diagonals(lengths):
+    names = ("DIAG_AC", "DIAG_BD", "SIDE_AD")
+    text = "#define SKEW_CORRECTION\n" + "".join(
+        f"  #define XY_{name} {length}    //08/19/18\n"
+        for name, length in zip(names, lengths, strict=True)
+    )
+    expected = {"EC0Y": pytest.approx(skew_urad(*lengths))}
+    assert read(text, "Configuration.h").constants == expected
 
 
 LENGTHS = (
@@ -288,6 +385,26 @@ def test_linuxcnc_guides_without_their_distance_or_file(names, has_machine, mess
         read_comp(*names, machine=machine)
 
 
+def test_linuxcnc_corrections_in_inches():
+    """Type 1 adds its numbers: 1.0 0.002 -0.003 in inches is -50.8 and +76.2 µm at 25.4 mm."""
+    ini = (
+        COMP["g.ini"].replace("= mm", "= inch").replace("COMP_FILE_TYPE = 0", "COMP_FILE_TYPE = 1")
+    )
+    sources = [source_of_text(ini, "g.ini")]
+    sources.append(source_of_text("1.0 0.002 -0.003\n2.0 0.001 -0.002\n", "x.comp"))
+    (exx,) = read_errors(sources, ReadOptions()).imported.series
+    assert exx.positions == pytest.approx([25.4, 50.8])
+    assert exx.in_direction(FORWARD) == pytest.approx([-50.8, -25.4])
+    assert exx.in_direction(BACKWARD) == pytest.approx([76.2, 50.8])
+
+
+def test_linuxcnc_actual_positions():
+    text = "-20 -20.0015 -19.9985\n-10 -10.001 -9.999\n0 0 0.002\n10 10.001 10.003\n"
+    (exx,) = read(text, "x_type0.comp", axis="X").series
+    assert exx.in_direction(FORWARD) == pytest.approx([-1.5, -1.0, 0.0, 1.0])
+    assert exx.in_direction(BACKWARD) == pytest.approx([1.5, 1.0, 2.0, 3.0])
+
+
 @pytest.mark.parametrize(
     ("variant", "text", "message"),
     [
@@ -307,9 +424,89 @@ NAMED = {
     "a HEIDENHAIN digital readout": "#\nND-280 MM\nAXIS X1 = 0\n",
     "an EasyRoute control": "unit = mm\n[X]\n0, 0.000, 0.010\n",
     "a screw map of Mach3": "-10.0,-10.001\n0,0\n10,10.002\n",
-    "a compensation value list of ISG": "kopf.log_achs_nr 2\nkw.ssfk.unit 1\n",
+    "a list of cross or plane compensation of ISG": "kopf.achs_nr 2\nkw.crosscomp.unit 1\n",
     "a bed mesh of Klipper": "[bed_mesh]\n",
 }
+
+
+BC = load_scene("machine_trunnion_bc").machine
+ISG = """# list of the Y axis
+kopf.log_achs_nr      2
+kopf.log_achs_name    Y-ACHSE
+kw.ssfk.interval      0
+kw.ssfk.kw_nr_max     3
+kw.ssfk.unit          1   /* 0: increments 1: metric */
+kw.ssfk.bilateral     1
+kw.ssfk.table[0].setpoint -200000
+kw.ssfk.table[1].setpoint -199306
+kw.ssfk.table[2].setpoint -198667
+kw.ssfk.table[0].pos  0
+kw.ssfk.table[1].pos  24
+kw.ssfk.table[2].pos  -102
+kw.ssfk.table[0].neg  0
+kw.ssfk.table[1].neg  67
+kw.ssfk.table[2].neg  80
+"""
+EQUAL_STEPS = (
+    ISG.replace("interval      0", "interval      20000\nkw.ssfk.kw_startpos   -909000")
+    .replace("bilateral     1", "bilateral     0")
+    .replace("Y-ACHSE", "X_ACHSE")
+)
+EQUAL_STEPS = "\n".join(
+    line for line in EQUAL_STEPS.splitlines() if not re.search(r"neg|setp", line)
+)
+
+
+def test_isg_lists_in_both_directions():
+    """The example of TF5200: programmed 19866.7 µm, measured 10.2 µm less is -102."""
+    imported = read(ISG, "achskw2.lis")
+    (eyy,) = imported.series
+    assert eyy.key == "EYY"
+    assert eyy.positions == pytest.approx((-20.0, -19.9306, -19.8667))
+    assert eyy.in_direction(FORWARD) == pytest.approx([0.0, 2.4, -10.2])
+    assert eyy.in_direction(BACKWARD) == pytest.approx([0.0, 6.7, 8.0])
+    assert any("actual − nominal" in text for text in imported.assumed)
+    (reversed_sign,) = read(ISG, "achskw2.lis", sign="correction").series
+    assert reversed_sign.in_direction(FORWARD) == pytest.approx([0.0, -2.4, 10.2])
+
+
+def test_isg_lists_with_equal_steps_in_one_direction():
+    (exx,) = read(EQUAL_STEPS, "x.lis").series
+    assert (exx.key, exx.positions) == ("EXX", pytest.approx((-90.9, -88.9, -86.9)))
+    assert exx.reversal is None
+    assert exx.values == pytest.approx([0.0, 2.4, -10.2])
+    (ecc,) = read(EQUAL_STEPS.replace("X_ACHSE", "C AXIS"), "c.lis", machine=BC).series
+    assert ecc.values == pytest.approx(np.array([0.0, 0.0024, -0.0102]) * np.pi / 180.0 * 1e6)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("unit          1", "unit          0", "line 6: unit 0: increments .*; expected unit 1"),
+        ("kw.ssfk.unit", "kw.ssfk.unity", "has no kw.ssfk.unit"),
+        (
+            "bilateral     1",
+            "bilateral     0",
+            r"line 14: .*\[0\].neg is not used; expected setpoint and",
+        ),
+        ("nr_max     3", "nr_max     4", r"has no kw.ssfk.table\[3\].setpoint; expected 4 points"),
+        (
+            "nr_max     3",
+            "nr_max     2",
+            r"line 10: .*\[2\].setpoint is not used; .* below 2",
+        ),
+        ("-199306", "-200306", "line 9: position -20.0306 after -20"),
+        ("pos  24", "pos  2,4", "line 12: pos '2,4' has a decimal comma"),
+        ("[1].pos  24", "[0].pos  24", r"line 12: kw.ssfk.table\[0\].pos is repeated"),
+        ("[1].pos  24", "[1].pso  24", r"line 12: kw.ssfk.table\[1\].pso is not used"),
+        ("[1].pos  24", "[1].pos", "line 12: .*; expected kw.ssfk.NAME NUMBER"),
+        ("Y-ACHSE", "Spindel", "line 3: axis 'SPINDEL' is unknown"),
+    ],
+)
+def test_isg_lists_that_are_not_understood_are_refused(before, after, message):
+    assert before in ISG
+    with pytest.raises(SceneError, match=message):
+        read(ISG.replace(before, after), "y.lis")
 
 
 @pytest.mark.parametrize("title", NAMED)
@@ -548,6 +745,27 @@ def xlsx(rows):
         for name, text in parts.items():
             archive.writestr(name, head + text)
     return content.getvalue()
+
+
+def test_a_table_of_fanuc_with_a_decimal_comma_is_refused():
+    text = (
+        "# three-dimensional error compensation; g\n# detection unit = 0,001 mm\n"
+        "# magnification = 1\npoint;X [mm];Y [mm];Z [mm];CX;CY;CZ\n1;-275;-225;-480;-4;-47;8\n"
+    )
+    with pytest.raises(SceneError, match="line 2: detection unit '0,001' has a decimal comma"):
+        read(text, "gde.csv")
+
+
+@pytest.mark.parametrize("mark", [" ", ";"])
+def test_volumetric_lists_of_isg(mark):
+    rows = ["X EXX EYX EAX", "-100 0.0 0.0 0.00001", "0 0.001 0.002 0.00002"]
+    rows += ["100 0.003 0.001 0.00003", "#", "C0Y", "0.00002"]
+    imported = read("\n".join(["// ISG csv", *rows]).replace(" ", mark), "v.csv")
+    values = {error.key: error.values.tolist() for error in imported.series}
+    assert values["EXX"] == pytest.approx([0.0, 1.0, 3.0])
+    assert values["EYX"] == pytest.approx([0.0, 2.0, 1.0])
+    assert values["EAX"] == pytest.approx([10.0, 20.0, 30.0])
+    assert imported.constants == pytest.approx({"EC0Y": 20.0})
 
 
 def test_spreadsheets(tmp_path):

@@ -1,5 +1,7 @@
 """URDF in and out: poses against the kinematics of yourdfpy."""
 
+import re
+
 import numpy as np
 import pytest
 import yourdfpy
@@ -103,6 +105,49 @@ def test_an_imported_robot_has_the_poses_of_yourdfpy(tmp_path_factory, text, ran
     si = {joint.name: in_si(machine, at)[axis_of[joint.name]] for joint in moving}
     found_mm = tool_in_workpiece_mm(machine, at)
     assert found_mm == pytest.approx(pose_by_yourdfpy_mm(robot, si), abs=SINGLE_PRECISION_MM)
+
+
+FANUC = """revolute,0 0 0.35,0 0 0,0 0 1 revolute,0.15 0 0,0 0 0,0 1 0
+revolute,0 0 0.25,0 0 0,0 -1 0 revolute,0 0 0.075,0 0 0,-1 0 0
+revolute,0.29 0 0,0 0 0,0 -1 0 revolute,0.08 0 0,0 0 0,-1 0 0
+fixed,0 0 0,3.14159265359 -1.57079632679 0,0 0 1"""
+GEN3 = """continuous,0 0 0.15643,3.1416 0 0,0 0 1 revolute,0 0.005375 -0.12838,1.5708 0 0,0 0 1
+continuous,0 -0.21038 -0.006375,-1.5708 0 0,0 0 1 revolute,0 0.006375 -0.21038,1.5708 0 0,0 0 1
+continuous,0 -0.20843 -0.006375,-1.5708 0 0,0 0 1 revolute,0 0.00017505 -0.10593,1.5708 0 0,0 0 1
+continuous,0 -0.10593 -0.00017505,-1.5708 0 0,0 0 1 fixed,0 0 -0.059525,3.1416 0 0,0 0 1"""
+FANUC_AT = {"C": 20.0, "B1": 30.0, "B2": -15.0, "A1": 40.0, "B3": 50.0, "A2": -60.0}
+
+
+def robot_of(rows):
+    """A chain of joints of public robots: type, origin, roll pitch yaw, axis."""
+    joints = re.findall(r"(\w+),([^,]+),([^,]+),(\S+ \S+ \S+)", rows)
+    text = "".join(f'<link name="l{n}"/>' for n in range(len(joints) + 1))
+    for n, (kind, xyz, rpy, axis) in enumerate(joints):
+        limit = "" if kind == "fixed" else '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
+        text += (
+            f'<joint name="j{n}" type="{kind}"><origin xyz="{xyz}" rpy="{rpy}"/>'
+            f'<axis xyz="{axis}"/>'
+            f'<parent link="l{n}"/><child link="l{n + 1}"/>{limit}</joint>'
+        )
+    return f'<robot name="r">{text}</robot>'
+
+
+@pytest.mark.parametrize(
+    ("rows", "at", "expected"),
+    [(FANUC, FANUC_AT, (552.834, 243.136, 411.313)), (GEN3, {}, None)],
+)
+def test_public_robots_have_their_poses_and_no_errors(tmp_path, rows, at, expected):
+    path = tmp_path / "robot.urdf"
+    path.write_text(robot_of(rows), encoding="utf-8")
+    robot, _ = read_robot(path)
+    found = place_robot(robot, "robot")
+    scene = parse_scene(imported_text(found.machine, "robot.urdf", found.notes, {}), "robot")
+    assert not list(scene.errors)
+    at = at or dict.fromkeys(scene.machine.axes, 0.0)
+    pose = tool_in_workpiece_mm(scene.machine, at)
+    if expected is None:  # stretched upwards
+        expected = pose_by_yourdfpy_mm(robot, {}, robot.links[-1].name, robot.links[0].name)[:3, 3]
+    assert pose[:3, 3] == pytest.approx(np.array(expected), abs=1e-2)
 
 
 @given(models())

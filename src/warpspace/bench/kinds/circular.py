@@ -50,9 +50,10 @@ class CircleFit:
     mean_radial_um: float | None
     # H, largest difference between the senses at one angle. Both None where one sense was run.
     hysteresis_um: float | None
-    # amplitudes of the sin 2φ and cos 2φ parts; None and 0 on arcs that are too short
+    # amplitude of the sin 2φ part, and radius along the first axis minus radius along the second
+    # (twice the cos 2φ part); None and 0 on arcs that are too short
     shear_um: float | None
-    scale_difference_um: float
+    radius_difference_um: float
 
     def details(self, plan: BenchPlan) -> dict[str, object]:
         """Return the further numbers of an outcome."""
@@ -113,7 +114,7 @@ def fit_circle_readings(plan: BenchPlan, readings: Array) -> CircleFit:
         float(np.linalg.lstsq(design[:, :3], readings, rcond=None)[0][0]) if both_senses else None,
         _hysteresis(marks["angle_deg"], sense, radial) if both_senses else None,
         float(fit[4]) if elliptic else None,
-        float(fit[3]) if elliptic else 0.0,
+        2.0 * float(fit[3]) if elliptic else 0.0,
     )
 
 
@@ -288,9 +289,9 @@ class Circular(BenchTest):
         if fit.shear_um is not None and not self.rotary:
             key, lever = plan.squareness_key, self.radius_mm * UM_PER_MM_URAD
             squareness = 2.0 * fit.shear_um / (float(plan.marks["gain_sign"][0]) * lever)
-            label = f"half of radius along {self.plane[0]} − radius along {self.plane[1]}"
+            label = f"radius along {self.plane[0]} − radius along {self.plane[1]}"
             rows.append(("squareness_urad", f"squareness {key}", squareness))
-            rows.append(("scale_difference_um", label, fit.scale_difference_um))
+            rows.append(("radius_difference_um", label, fit.radius_difference_um))
             details["squareness_key"] = key
         return build_outcome(rows, details | fit.details(plan))
 

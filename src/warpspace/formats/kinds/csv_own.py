@@ -2,7 +2,6 @@
 
 import math
 import re
-from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -360,19 +359,15 @@ def _series(table: _CsvTable, axis: str) -> measured.ImportedErrors:
 def _check_complete(
     source: Source, key: str, readings: Mapping[tuple[int, int], Array], places: Array, axis: str
 ) -> None:
-    missing = np.isnan(list(readings.values())).all(axis=0)
-    if missing.any():
-        problem = f"{key} has no value at {axis} {places[missing][0]:g}"
-        source.refuse(problem, "one at every position")
-    by_direction: defaultdict[int, list[Array]] = defaultdict(list)
-    for (_, direction), errors in readings.items():
-        by_direction[direction].append(errors)
     names = {measured.FORWARD: "forward", measured.BACKWARD: "backward"}
-    for direction, runs in by_direction.items():
+    for direction in (None, *dict.fromkeys(way for _, way in readings)):
+        runs = [errors for (_, way), errors in readings.items() if direction in (None, way)]
         missing = np.isnan(runs).all(axis=0)
         if missing.any():
-            place = f"{axis} {places[missing][0]:g} in {names.get(direction, 'any')} direction"
-            source.refuse(f"{key} has no value at {place}", "every direction at every position")
+            is_any = direction is None
+            place = "" if is_any else f" in {names.get(direction, 'any')} direction"
+            expected = "one at every position" if is_any else "every direction at every position"
+            source.refuse(f"{key} has no value at {axis} {places[missing][0]:g}{place}", expected)
 
 
 def _surfaces(table: _CsvTable) -> measured.ImportedErrors:

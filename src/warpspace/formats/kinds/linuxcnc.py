@@ -134,31 +134,35 @@ def _rows(source: Source, per_unit: float, notes: list[str]) -> np.ndarray:
     return np.array(rows)
 
 
+CONTENTS = {POSITIONS: "actual positions", OFFSETS: "corrections"}
+
+
 def _kind(source: Source, rows: np.ndarray, stated: str) -> tuple[str, tuple[str, ...]]:
     follows, stays = _nearness(rows)
-    if (stated == OFFSETS and follows and not stays) or (
-        stated == POSITIONS and stays and not follows
-    ):
-        other = POSITIONS if stated == OFFSETS else OFFSETS
-        contents = "actual positions" if stated == OFFSETS else "corrections"
-        source.refuse(f"looks like {contents}, but is {stated}", f"{stated} (is it {other}?)")
-    if stated:
-        return stated, ()
     kind = POSITIONS if follows and not stays else OFFSETS
-    description = "actual positions (type 0)" if kind == POSITIONS else "offsets (type 1)"
-    return kind, (f"second and third column: {description}; --variant selects the other type",)
+    if not stated:
+        description = f"{CONTENTS[kind]} ({kind.replace('-', ' ')})"
+        return kind, (f"second and third column: {description}; --variant selects the other type",)
+    if follows != stays and kind != stated:
+        problem = f"looks like {CONTENTS[kind]}, but is {stated}"
+        source.refuse(problem, f"{stated} (is it {kind}?)")
+    return stated, ()
+
+
+def _table(axis: str, places: np.ndarray, forward: np.ndarray, backward: np.ndarray) -> AxisTable:
+    is_alike = np.array_equal(forward, backward)
+    reverse = () if is_alike else tuple(backward.tolist())
+    positions, upwards = tuple(places.tolist()), tuple(forward.tolist())
+    return AxisTable(axis, axis, positions, upwards, backward=reverse)
 
 
 def _combined(tables: Sequence[AxisTable], weights: Sequence[float]) -> AxisTable:
     at = np.unique(np.concatenate([table.positions for table in tables]))
     forward, backward = (
-        sum(weight * table.at(at, way) for weight, table in zip(weights, tables, strict=True))
+        np.sum([w * table.at(at, way) for w, table in zip(weights, tables, strict=True)], axis=0)
         for way in (1, -1)
     )
-    upwards, downwards = (tuple(np.asarray(moves).tolist()) for moves in (forward, backward))
-    axis = tables[0].source
-    reverse = () if upwards == downwards else downwards
-    return AxisTable(axis, axis, tuple(at.tolist()), upwards, backward=reverse)
+    return _table(tables[0].source, at, forward, backward)
 
 
 def _joint_tables(
@@ -202,10 +206,7 @@ def _joint_tables(
         kind, assumptions = _kind(source, rows, options.variant or kind)
         assumed += assumptions
         trims = rows[:, :1] - rows[:, 1:] if kind == POSITIONS else rows[:, 1:]
-        nominal, forward, reverse = (tuple(column.tolist()) for column in (rows[:, 0], *trims.T))
-        backward = () if forward == reverse else reverse
-        table = AxisTable(axis, axis, nominal, forward, backward=backward)
-        tables.setdefault(axis, []).append(table)
+        tables.setdefault(axis, []).append(_table(axis, rows[:, 0], *trims.T))
     if not tables:
         sources[0].refuse("names files", "the files of its COMP_FILE lines with it")
     letters = [axis for axis, _, _ in joints.values()]
@@ -217,9 +218,7 @@ def _joint_tables(
         for axis, parts in tables.items()
         if len(parts) > 1
     ]
-    means = tuple(
-        parts[0] if len(parts) == 1 else _combined(parts, (0.5, 0.5)) for parts in tables.values()
-    )
+    means = tuple(_combined(parts, (1.0 / len(parts),) * len(parts)) for parts in tables.values())
     return tables, Tables(means, tuple(dict.fromkeys(assumed)), tuple(notes))
 
 

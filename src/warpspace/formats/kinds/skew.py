@@ -13,7 +13,7 @@ are the factors of XY, XZ, YZ; S that of XY), and Marlin/src/inc/Conditionals_po
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -295,7 +295,7 @@ def _write_klipper(corrections: RequiredCorrections) -> Files:
 
 
 DIGITS = 6  # decimals of a factor, as in the report of the firmware
-LETTERS = {"I": "XY", "S": "XY", "J": "XZ", "K": "YZ"}
+LETTERS = {"I": "XY", "J": "XZ", "K": "YZ", "S": "XY"}
 _WORD = re.compile(r"([A-Z])\s*([^A-Z\s]*)")
 _DEFINE = re.compile(r"#\s*define\s+(XY|XZ|YZ)_(DIAG_AC|DIAG_BD|SIDE_AD|SKEW_FACTOR)\s+(\S+)")
 _SWITCH = re.compile(r"#\s*define\s+(SKEW_CORRECTION(?:_FOR_Z)?)\b")
@@ -366,20 +366,29 @@ def _read_marlin(
             for plane, number in _REPORTED.findall(bare):
                 factors[plane] = (at, at.number(number, plane))
         elif re.match(r"M852\b", bare):
-            if _WORD.sub("", bare[4:]).strip():
-                at.refuse(at.quoted, "M852 with I, J, K or S")
-            parameters = _WORD.findall(bare[4:])
-            planes = [LETTERS.get(letter, "") for letter, _ in parameters]
-            for plane, (letter, number) in zip(planes, parameters, strict=True):
-                if not plane:
-                    at.refuse(f"M852 {letter}", "I, J, K or S")
-                if planes.count(plane) > 1:
+            planes: set[str] = set()
+            for letter, factor in _parameters(at, bare, LETTERS).items():
+                plane = LETTERS[letter]
+                if plane in planes:
                     at.refuse(f"M852 sets {plane} twice", "it once")
-                factors[plane] = (at, at.number(number, f"M852 {letter}"))
+                planes.add(plane)
+                factors[plane] = (at, factor)
         elif not _IDLE.match(line):
             unread.append(at)
     notes += unread_notes(unread)
     return switches
+
+
+def _parameters(at: SourceLine, command: str, letters: Collection[str]) -> dict[str, float]:
+    """Read the letters of a command with their numbers, each once."""
+    name, text = command[:4], command[4:]
+    parameters = _WORD.findall(text)
+    numbers = {letter: at.number(number, f"{name} {letter}") for letter, number in parameters}
+    is_unknown = _WORD.sub("", text).strip() or not numbers.keys() <= {*letters}
+    if is_unknown or len(numbers) < len(parameters):
+        *before, last = letters
+        at.refuse(at.quoted, f"{name} with {', '.join(before)} or {last}, each once")
+    return numbers
 
 
 def _defined_factor(
@@ -413,7 +422,6 @@ def _write_marlin(corrections: RequiredCorrections) -> Files:
     return {"": f"{head}M852 {' '.join(parameters)}\n"}
 
 
-_M556 = re.compile(r"M556\b(.*)", re.IGNORECASE)
 TANGENTS = {"X": ("X", "Y"), "Y": ("Y", "Z"), "Z": ("X", "Z")}
 """Corrected axis and axis of the position of each letter of M556."""
 
@@ -426,15 +434,11 @@ def _read_m556(sources: Sequence[Source], options: ReadOptions) -> Tables:
     for source in sources:
         unread: list[SourceLine] = []
         for at, bare in source.scan(";"):
-            command = _M556.fullmatch(bare)
-            parameters = _WORD.findall(command[1].upper()) if command else []
-            numbers = {letter: at.number(text, f"M556 {letter}") for letter, text in parameters}
-            if not numbers:
+            command = bare.upper()
+            if not re.match(r"M556\s*[A-Z]", command):
                 unread.append(at)
                 continue
-            is_unknown = command is not None and _WORD.sub("", command[1].upper()).strip()
-            if is_unknown or len(numbers) < len(parameters) or not numbers.keys() <= {*"SXYZP"}:
-                at.refuse(at.quoted, "S, X, Y, Z and P, each once")
+            numbers = _parameters(at, command, "SXYZP")
             length = numbers.pop("S", 0.0)
             if length <= 0.0:
                 at.refuse(

@@ -46,6 +46,12 @@ class Frames(Control):
         linear = {x: index for x, index in self.index.items() if x in "XYZ"}
         self.pending |= {x for x, index in linear.items() if changed[index] or index in unknown}
 
+    def check_alone(self, code: str) -> None:
+        """Refuse a frame of SINUMERIK beside other codes, or after a word."""
+        keys = [key for key, _ in self.tokens if key not in {"", "N", "skipped"}]
+        if keys[0] != code or len(self.codes) > 1:
+            self.refuse(code, "expected it first in its block, without other codes")
+
     def rotate(self, code: str) -> None:
         """Rotate coordinates in the plane about a point (G68), until G69."""
         if code == "G69":
@@ -91,6 +97,7 @@ class Frames(Control):
 
     def program_frame(self, code: str) -> None:
         """Shift, rotate or mirror coordinates on SINUMERIK; an additive one begins with A."""
+        self.check_alone(code)
         kind, letters = code.removeprefix("A"), {*self.words} - {"N"}
         old = None if self.programmed is None or kind == code else self.programmed
         if not letters <= {*"XYZ", *(("RPL",) if kind == "ROT" else ())} or (

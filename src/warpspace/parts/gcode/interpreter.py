@@ -40,6 +40,7 @@ from warpspace.parts.gcode.control_settings import (
 from warpspace.parts.gcode.cycles import CYCLES, Cycles
 from warpspace.parts.gcode.dialects.detection import DIALECTS, KLARTEXT, detect_dialects
 from warpspace.parts.gcode.dialects.dialect import COMMON, MODAL_LETTERS, NO_AXES, WHOLE_BLOCK
+from warpspace.parts.gcode.motion import CORNERS
 from warpspace.parts.gcode.parsed import STAND, ParsedProgram
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import check_file
@@ -68,6 +69,7 @@ _FLOW = re.compile(  # of LinuxCNC, without variables
 _CONTROL_FLOW = re.compile(r".*[#\[<=]|GOTO|IF|WHILE|FOR|LOOP|REPEAT|CALL")
 _AXES, _POSITIONS = frozenset("XYZUVWABC"), frozenset("XYZUVWABCIJKRQ")
 _CYCLE_LETTERS = "RQPKL"
+CALLS = frozenset(("M97", "M98", "M99"))
 _LETTERS = {  # beside axes, by the code that they belong to
     "G0": ["E"], "G1": ["E", ",R", ",C", "CHF"], **dict.fromkeys(("G2", "G3"), "IJKRPE"),
     **dict.fromkeys(CYCLES, _CYCLE_LETTERS),
@@ -102,6 +104,9 @@ def read_program(
     control = Interpreter(scene, settings or ControlSettings(), name)
     for _ in control.run(lines):
         pass
+    if control.corner and not control.refused:
+        control.refused[control.line] = control.corner[0]
+        control.reasons[control.line] = "; expected G1 after a corner"
     if not control.first:
         problems = [f"line {n}: {word}{control.reasons[n]}" for n, word in control.refused.items()]
         raise SceneError(name, problems[:1] or ["moves no axis; expected blocks in G-code"])
@@ -191,7 +196,7 @@ class Interpreter(Cycles):
             if {"M2", "M30"} & {*self.codes} or len(self.refused) > MAX_REMARKS:
                 return
         if self.calls and not self.refused:
-            self.refused[self.line] = program[-1].strip()[:MAX_SHOWN]
+            self.refused[self.line] = program[-1].strip()[:MAX_SHOWN] or "end of file"
             self.reasons[self.line] = "; expected M99 at the end of the subprogram"
 
     def read_words(self, text: str) -> None:
@@ -282,6 +287,11 @@ class Interpreter(Cycles):
                 claimed |= {"I", "J"}
         for letter, value in self.words.items():
             word = f"{letter}{value:g}"
+            corners = CORNERS & self.words.keys()
+            if letter in corners and (
+                len(corners) > 1 or not self.words.keys() & self.index.keys()
+            ):
+                self.refuse(word, "expected one corner and a move in its block")
             if letter in _AXES and letter not in self.index and letter not in claimed:
                 axes = f"{self.scene.machine.chain}: {', '.join(self.index)}"
                 self.refuse(word, f"expected an axis of {axes}")
@@ -291,28 +301,34 @@ class Interpreter(Cycles):
     def execute_block(self) -> None:
         """Execute the codes of the current block, then its motion."""
         motions = [code for code in self.codes if code in MOTIONS]
-        if len({*motions}) > 1:
-            self.refuse(motions[-1], f"expected it in another block than {motions[0]}")
-        self.once = next((x for x in map(self.once_codes.get, self.codes) if x), "")
+        once = [code for code in self.codes if self.once_codes.get(code)]
+        if len({*motions}) > 1 or len(once) > 1:
+            first, *_, last = once if len(once) > 1 else motions
+            self.refuse(last, f"expected it in another block than {first}")
+        self.once = self.once_codes[once[0]] if once else ""
         motion = motions[0] if motions else "G0" if "G80" in self.codes else self.motion
         if not self.words.keys() <= self.ordinary:
             self.check_letters(motion)
         if "H" in self.words and not WITH_H & {*self.codes}:
             self.remarks.setdefault(f"H{self.words['H']:g} without G43", self.line)
-        if self.words.keys() & _AXES:
-            for code in self.codes:
-                if code not in self.handlers and self.motionless[code].endswith(NO_AXES):
-                    self.refuse(code, "expected no axis in its block")
         # X of G4 is a time
-        self.letters = set[str]() if self.once == "G4" else self.words.keys() & _AXES
+        axes = self.words.keys() & _AXES
+        self.letters = set[str]() if self.once == "G4" else axes
+        for code in self.codes if axes else ():
+            if code not in self.handlers and self.motionless[code].endswith(NO_AXES):
+                self.refuse(code, "expected no axis in its block")
         if self.dialect == "sinumerik" and "D" in self.words:
             self.compensate("D")
         for code in self.codes:
             if code in self.handlers:
                 self.handlers[code](self, code)
+            elif code in {"G5", "G8"} and "P" not in self.words:
+                self.refuse(code, "expected P")
         self.cycle = self.cycle if self.motion in CYCLES else {}
         if self.corner and (self.once or (self.letters and self.motion != "G1")):
             self.refuse(self.once or self.motion, f"expected G1 after a corner {self.corner[0]}")
+        calls = [code for code in self.codes if code in CALLS]
+        subprogram = self.find_subprogram(calls) if calls else None
         is_arc = self.motion in {"G2", "G3"} and self.words.keys() & {*"IJKR"}
         if self.once in {"G28", "G30"}:
             self.move_home()
@@ -322,8 +338,10 @@ class Interpreter(Cycles):
             if "E" in self.words:
                 self.remarks.setdefault("E is no axis", self.line)
             MOTIONS[self.motion](self)
-        for code in {"M97", "M98", "M99"} & {*self.codes}:
-            self.call(code)
+        if subprogram:
+            self.enter(*subprogram)
+        elif "M99" in self.codes:
+            self.leave()
 
     def follow_flow(self, name: str, word: str, count: str | None) -> None:
         """Continue as an O-word of LinuxCNC demands."""
@@ -335,37 +353,35 @@ class Interpreter(Cycles):
             self.refuse(f"O{name} {word}", f"expected O{name} {partner}, [number] with REPEAT")
         if other is None:
             self.leave()
-        elif word == "SUB" or (count and not int(count)):
+        elif word == "SUB":
             self.next_line = at
         else:
             start, caller = (at, self.next_line) if word == "CALL" else (self.next_line, at)
             self.enter(word, start, int(count or 1), caller)
 
     def enter(self, word: str, start: int, repeats: int, caller: int) -> None:
-        """Continue at a subprogram."""
+        """Continue at a subprogram, or after it."""
         if len(self.calls) >= MAX_CALLS:
             self.refuse(word, f"expected at most {MAX_CALLS} subprograms within each other")
-        if repeats:
-            self.calls.append((start, repeats - 1, caller))
-            self.next_line = start
-
-    def leave(self) -> None:
-        """Repeat a subprogram, continue after its call, or end the program."""
-        start, repeats, caller = self.calls.pop() if self.calls else (0, 0, MAX_LINES)
         self.next_line = start if repeats else caller
         if repeats:
             self.calls.append((start, repeats - 1, caller))
 
-    def call(self, code: str) -> None:
-        """Execute M97, M98 or M99."""
+    def leave(self) -> None:
+        """Repeat a subprogram, continue after its call, or end the program."""
+        self.enter("M99", *(self.calls.pop() if self.calls else (0, 0, MAX_LINES)))
+
+    def find_subprogram(self, codes: Sequence[str]) -> tuple[str, int, int, int] | None:
+        """Find the subprogram that a block calls: code, start, repetitions, and line after it."""
+        for other in codes[1:]:
+            self.refuse(other, f"expected it in another block than {codes[0]}")
+        code = codes[0]
         self.uncorrectable.setdefault(self.line, code)
         if code == "M99":
-            self.leave()
-            return
+            return None
         kind, number, repeats = "NO"[code == "M98"], self.words.get("P", 0.0), self.count("L")
         if (kind, number) not in self.labels and "L" not in self.words:
             repeats, number = max(int(number) // 10_000, 1), number % 10_000
         if (kind, number) not in self.labels:
             self.refuse(f"{code} P{number:g}", f"expected {kind}{number:g} in this file")
-        start = self.labels[kind, int(number)] - (kind == "N")
-        self.enter(code, start, repeats, self.next_line)
+        return code, self.labels[kind, int(number)] - (kind == "N"), repeats, self.next_line

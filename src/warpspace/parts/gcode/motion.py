@@ -2,7 +2,7 @@
 
 from cmath import phase
 from collections.abc import Mapping, Sequence
-from math import ceil, copysign, cos, sqrt, tan, tau
+from math import ceil, copysign, cos, pi, sqrt, tan, tau
 
 import numpy as np
 
@@ -56,9 +56,8 @@ class Motion(Frames):
         self.record(kind)
         for letter in CORNERS & self.words.keys():
             is_tilted = self.frame is not None and abs(self.frame[self.across, self.across]) < 1.0
-            if kind != FEED or self.tcp or is_tilted or self.corner:
-                expected = "one corner of G1, without tool centre point or tilted plane"
-                self.refuse(letter, f"expected {expected}")
+            if kind != FEED or self.tcp or is_tilted:
+                self.refuse(letter, "expected a move of G1 in the plane, without tool centre point")
             self.corner = letter, self.value(letter), len(self.rows) // self.width - 1
         if bare:
             self.switch(tcp=tcp, length_mm=self.length_mm)
@@ -73,10 +72,10 @@ class Motion(Frames):
         arrival, departure = flat[1] - flat[0], flat[2] - flat[1]
         across = {*range(len(self.names))} - {*indices}
         is_flat = all(first[i] == at[i] == self.position[i] for i in across)
-        if not is_flat or kind != FEED or not arrival or not departure:
-            self.refuse(letter, "expected two moves in the plane")
-        angle = phase(departure / arrival)
+        angle = phase(departure / arrival) if arrival and departure else pi
         half = abs(angle) / 2.0
+        if not is_flat or kind != FEED or pi - abs(angle) < FULL_TURN_RAD:
+            self.refuse(letter, "expected two moves in the plane, not back")
         length = {",R": size * tan(half), ",C": size}.get(letter, size / (2.0 * cos(half)))
         limit = min(abs(arrival), abs(departure))
         if size <= 0.0 or length > limit:

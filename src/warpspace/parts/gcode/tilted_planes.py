@@ -117,6 +117,7 @@ class TiltedPlanes(Motion):
 
     def swivel_cycle(self, code: str) -> None:
         """Execute CYCLE800 with rotations axis by axis; without arguments end the plane."""
+        self.check_alone(code)
         arguments = [argument.strip() for argument in self.arguments.split(",")]
         if self.programmed is not None or (self.tcp and not self.is_tilted) or self.letters:
             self.refuse(code, "expected no axes, and TRANS without axes and TRAFOOF before")
@@ -127,7 +128,8 @@ class TiltedPlanes(Motion):
             self.lost |= {i for i in rotary if self.position[i]}
             return
         fields = [argument or "0" for argument in (*arguments[:1], *arguments[2:])]
-        if len(fields) < 13 or not all(re.fullmatch(NUMBER, field) for field in fields):
+        is_name = re.fullmatch(r"(\"[^\"]*\")?", "".join(arguments[1:2]))
+        if len(fields) < 13 or not is_name or not all(re.fullmatch(NUMBER, x) for x in fields):
             self.refuse(code, "expected 14 arguments or more, all numbers but the second")
         retract, status, mode, *numbers = map(float, fields[:13])
         sense = numbers.pop()

@@ -27,6 +27,9 @@ SINUMERIK = Dialect(
         **dict.fromkeys(("G70", "G700"), modal("unit_mm", MM_PER_INCH)),
         **dict.fromkeys(("G71", "G710"), modal("unit_mm", 1.0)),
         **dict.fromkeys(("G58", "G59", "G10", "G52", "G68", "G92", "G92.1", "G43", *CYCLES)),
+        **dict.fromkeys(
+            ("G43.4", "G50.1", "G51.1", "G53.1", "G54.1", "G68.2", "M97", "M98", "M99")
+        ),
     },
     once={**{code: code for code in (*FRAMES, "CYCLE800")}, "SUPA": "G53", "G153": "G53"},
     comment=r"^;\$PATH",
