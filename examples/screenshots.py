@@ -177,7 +177,7 @@ def turned(page: Page) -> None:
 
 def rotated(page: Page) -> None:
     """Look at the rotary axes, with the table turned by the playback bar."""
-    page.get_by_role("button", name="Rotary axes", exact=True).click()
+    page.locator(".ws-drawings label", has_text="Rotary axes").click()
     page.get_by_label("Position of C", exact=True).fill("60")
     page.locator(".ws-plots").wait_for()
 

@@ -212,21 +212,24 @@ def sample_machines(state: AppState) -> Ensemble:
     return ENSEMBLES.get(_sampled(state), build, lambda ensemble: ensemble.size)
 
 
-def allowed_words(state: AppState) -> str:
+def allowed_words(state: AppState) -> Markup:
     """Format the largest |E| of sampled machines within tolerance, and that of all of them."""
     try:
         ensemble = sample_machines(state)
     except WarpspaceError:
-        return ""
+        return EMPTY
     ranges = _centres_and_widths(ensemble, state.tolerances)
     largest = float(ensemble.norm_um(*ranges).max())
     if not largest:
-        return ""
-    sampled = f"tolerances: {number(largest)} µm ({spell_count(len(ensemble.unit))} samples)"
-    if ensemble.spread is not None:  # each machine at a point of its own
-        return sampled
-    worst_um = worst_case_um(ensemble.gains.astype(float), *ranges)
-    return f"{sampled} · {number(worst_um)} µm (worst case)"
+        return EMPTY
+    worst = ""
+    if ensemble.spread is None:  # all machines at the same points
+        worst_um = worst_case_um(ensemble.gains.astype(float), *ranges)
+        worst = f", {number(worst_um)} µm worst case"
+    hint = f"Largest error of {spell_count(len(ensemble.unit))} sampled machines within tolerance"
+    if worst:
+        hint += ", and of the worst combination of errors within tolerance"
+    return tag("span", f"tolerances: {number(largest)} µm sampled{worst}", title=hint)
 
 
 def _centres_and_widths(ensemble: Ensemble, tolerances: ToleranceSet) -> Array:

@@ -85,7 +85,6 @@ class LegendPanel(Panel):
             body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
             limit_menu = menu(share, body, key="limit", hint="Change the limit",
                         kind="ws-pass" if is_pass else "ws-fail")  # fmt: skip
-            limit_menu = Markup(" · ") + limit_menu if legend.place_words(picture) else limit_menu
         return {"head.kept": limit_menu, "legend": legend.legend_html(picture)}
 
 
@@ -313,12 +312,14 @@ def _drawings(state: AppState) -> Markup:
     if all(map(is_linear, state.scene.machine.axes)):
         return EMPTY
     chosen = "rotary" if state.shows_rotary else "volume"
-    chips = (
-        button(label.capitalize(), "controls:drawing", key, kind="chip", pressed=key == chosen,
-               hint=f"Draw the {label}")
+    radios = (
+        fill('<label title="Draw the {title}"><input type="radio" name="drawing" value="{key}"'
+             '{checked} data-set="controls:drawing">{label}</label>',
+             title=label, key=key, label=label.capitalize(),
+             checked=Markup(" checked") if key == chosen else EMPTY)
         for key, label in DRAWINGS.items()
     )  # fmt: skip
-    return tag("div", join(chips), class_="ws-drawings", role="group", aria_label="Drawing")
+    return tag("div", join(radios), class_="ws-drawings", role="radiogroup", aria_label="Drawing")
 
 
 def _exaggeration(picture: LivePicture) -> Markup:
