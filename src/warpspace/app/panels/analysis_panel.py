@@ -47,7 +47,7 @@ TITLES = {
 }  # fmt: skip
 """Titles of sections that differ from the name of the command."""
 OF_STATE = frozenset({"loop", "placed"})  # options that are set once, for the whole page
-QUICK_S = 0.4  # an analysis that takes less is repeated after each change
+QUICK_S = 1.0  # an analysis that takes less is repeated after each change
 MOST_STEPS = 4  # errors listed on a card
 SAME = 1e-3  # µm or µrad; smaller changes of an error are not listed
 RECORD = button("Record decision", "notes:decide",
