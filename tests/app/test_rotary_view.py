@@ -96,7 +96,7 @@ def test_the_volume_is_hidden_and_all_traces_are_drawn():
     assert box(picture) == {}
     assert axis_labels(picture) == []
     shapes = draw_surroundings(picture)
-    assert set(shapes) == {"/traces/nominal", "/traces/actual"}
+    assert set(shapes) == {"/rotary/nominal", "/rotary/actual"}
     assert len(point_labels(picture)) == len(picture.moved_traces) > 0
     plain = LIVE.evaluate(put(ROTARY, "look.drawing", "volume"))
     assert box(plain)
@@ -104,7 +104,7 @@ def test_the_volume_is_hidden_and_all_traces_are_drawn():
 
 def test_without_rotary_errors_the_nominal_circles_are_drawn_and_it_says_why():
     picture = LIVE.evaluate(ROTARY)
-    assert set(draw_surroundings(picture)) == {"/traces/nominal"}
+    assert set(draw_surroundings(picture)) == {"/rotary/nominal"}
     html = lone_part(HeadPanel).render(picture)["head"]
     assert "No rotary errors" in html
     assert "the dashed circles are nominal" in html

@@ -100,14 +100,14 @@ def _rotary_traces(picture: LivePicture) -> Shapes:
     pieces = [dashes(polylines([*of.nominal_mm]), dash, dash) for of in picture.traces]
     nominal = np.concatenate([np.zeros((0, 2, 3)), *pieces])
     shapes: Shapes = {
-        "/traces/nominal": lines(nominal, colour(picture, "trace_nominal"), 1.5),
+        "/rotary/nominal": lines(nominal, colour(picture, "trace_nominal"), 1.5),
     }
     moved = [line for of in picture.traces if of.error_um.any() for line in of.each()]
     if moved:
         drawn = polylines([line.actual_mm for line in moved])
         errors = polylines([line.error_um for line in moved])
         values = component_values(errors, picture.component)
-        shapes["/traces/actual"] = lines(drawn, _line_colours(values, picture.scale), 4.0)
+        shapes["/rotary/actual"] = lines(drawn, _line_colours(values, picture.scale), 4.0)
     return shapes
 
 
