@@ -14,6 +14,7 @@ from warpspace.app.documents.scene_file import settings_line, with_settings
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.panels import measurement
+from warpspace.app.panels.error_list import origin_words
 from warpspace.app.panels.upload_panels import ImportPanel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
@@ -302,6 +303,12 @@ def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
     assert after.mean_um != pytest.approx(before.mean_um)
     assert applied.amplitudes["EXX"] == pytest.approx(10.0)
     assert applied.comparison.a.title == "before import"
+    name = column.part.files[0].name
+    assert origin_words(applied, "EXX")[0].strip() == f"measured, {name}"
+    edited = applied.with_amplitude("EXX", 4.0)
+    assert origin_words(edited, "EXX")[0].strip() == f"edited; before: measured, {name}"
+    assert origin_words(applied.reset(), "EXX") == origin_words(STATE, "EXX")
+    assert name not in origin_words(applied, "EAX")[0]
     assert "Applied" in column.html
     column.part.parse("y.csv", TABLE.replace(b"EXX", b"EYX"))()
     html = column.settle()

@@ -179,7 +179,7 @@ def edit_curve(
 
 
 def origin_words(state: AppState, key: str) -> tuple[str, bool]:
-    """Describe the origin of an error; return also if it is edited."""
+    """Describe the origin of an error; return also if it differs from the scene as opened."""
     scene, scene_curve = state.origin, state.own_curves.get(key)
     uncertainty, measurement = scene.uncertainty.get(key), scene.measured.get(key)
     if scene_curve is None:
@@ -193,8 +193,12 @@ def origin_words(state: AppState, key: str) -> tuple[str, bool]:
         text = "assumed: specified without readings"
     if uncertainty is not None:
         text += f"; u = {spell(abs(uncertainty.amplitude))} {parameter(key).unit} (k = 1)"
-    is_edited = state.curve(key) != (scene_curve or Constant(state.axis_span(key)))
-    return (f"edited; before: {text} " if is_edited else text), is_edited
+    curve, scene_curve = state.curve(key), scene_curve or Constant(state.axis_span(key))
+    differs = curve != scene_curve
+    file, reference = state.imported.get(key, ("", scene_curve))
+    if file and differs:
+        text = f"measured, {file} "
+    return (f"edited; before: {text} " if differs and curve != reference else text), differs
 
 
 def _chart(state: AppState, row: Parameter, function: ErrorFunction) -> Markup:

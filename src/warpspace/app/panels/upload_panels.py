@@ -204,6 +204,20 @@ class ImportPanel(FilesPanel):
     def actions(self, result: description.Result, *, stale: bool) -> Markup:
         return EMPTY
 
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        """Apply an import, and record the file of each error that it changes."""
+        changed = super().handle(state, action, value)
+        if action != "apply" or changed is state:
+            return changed
+        names = ", ".join(file.name for file in self.files)
+        curves = {key: changed.curve(key) for key in changed.amplitudes}
+        imported = {
+            key: (names, curve)
+            for key, curve in curves.items()
+            if key not in state.amplitudes or curve != state.curve(key)
+        }
+        return replace(changed, imported={**changed.imported, **imported})
+
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
         """Parse a file, together with the present ones if they belong together.
 

@@ -301,6 +301,10 @@ class AppState:
     # title of the scene whose errors were dropped with its machine; empty for none, and after the
     # next change of scene
     left_behind: str = field(default="", metadata=describe("Scene"))
+    # names of the files from which errors were imported, with the imported curve, by key
+    imported: Mapping[str, tuple[str, ErrorFunction]] = field(
+        default_factory=dict[str, tuple[str, ErrorFunction]], metadata=describe("Scene")
+    )
     look: Look = field(default_factory=Look)
     machine: MachineLook = field(default_factory=MachineLook)
     rotary: RotaryLook = field(default_factory=RotaryLook)
