@@ -94,7 +94,7 @@ def test_a_place_is_typed_linked_and_undone():
     assert "expected three numbers, or six" in put(STATE, "part.place", "1,2").notes[0]
 
 
-def test_the_part_of_a_scene_comes_with_it_and_stays(tmp_path):
+def test_the_part_of_a_scene_comes_and_goes_with_it(tmp_path):
     trimesh.creation.box((200, 150, 80)).export(tmp_path / "block.stl")
     (tmp_path / "ring.ngc").write_bytes(PROGRAM)
     text = (scenes_dir() / "dvf5000_first.toml").read_text("utf-8")
@@ -104,7 +104,10 @@ def test_the_part_of_a_scene_comes_with_it_and_stays(tmp_path):
     picture = LIVE.evaluate(own)
     assert None not in (picture.part, picture.path)
     assert (own.part.name, own.look.surface) == ("block.stl", "grid")
-    assert own.with_scene(SCENE).part == own.part  # until another comes
+    other = own.with_scene(SCENE)
+    assert other.part.is_empty
+    assert other.look == start_state(SCENE).look
+    assert "program.tcp" not in other.forms
     assert STATE.with_scene(own.scene).part == own.part
     sent, _ = open_text(state_to_toml(own), "sent", "sent")
     assert (sent.part.name, sent.part.is_empty) == ("block.stl", True)

@@ -61,7 +61,7 @@ LOOP_NAMES = {
     Loop.WORKPIECE.value: "workpiece point",
     Loop.RELATIVE.value: "tool relative to workpiece",
 }
-KEPT_FIELDS = ("component", "nodes", "shown", "look", "machine", "part", "forms", "page")
+KEPT_FIELDS = ("component", "nodes", "shown", "page")
 """Fields that stay when another scene is opened."""
 COMPARISON_VIEWS = {"a": "A", "b": "B", "difference": "B − A"}
 """Views of a comparison; the difference is the change from A to B."""
@@ -416,15 +416,11 @@ class AppState:
         return replace(self, amplitudes={**self.amplitudes, key: value})
 
     def with_scene(self, scene: Scene) -> "AppState":
-        """Open another scene in its own loop; component, density and switches stay."""
+        """Open another scene; component, density and switches stay, its part and drawing do not."""
         fresh, unchanged = start_state(scene), {name: getattr(self, name) for name in KEPT_FIELDS}
-        if not fresh.part.is_empty:
-            unchanged["part"], unchanged["look"] = fresh.part, replace(self.look, surface="grid")
-            unchanged["forms"] = {**self.forms, **fresh.forms}
         changed = replace(
             fresh,
             specification=self.specification if scene.limit_um is None else fresh.specification,
-            rotary=replace(self.rotary, off=frozenset()),
             **unchanged,
         )
         return changed.within_reach()
