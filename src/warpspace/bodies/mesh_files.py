@@ -21,6 +21,7 @@ FORMATS = {".stl": ("mm", "z"), ".obj": ("mm", "z"), ".ply": ("mm", "z"), ".glb"
 """Endings with their default unit and upward axis."""
 IMPORTED = FORMATS | {".3mf": ("mm", "z"), ".step": ("m", "z"), ".stp": ("m", "z")}
 """Endings that are read; files that are not written state their unit."""
+FARTHEST = 1e9  # largest coordinate of a vertex, in the unit of the file
 UNITS_3MF_MM = {
     "micron": 1e-3,
     "millimeter": 1.0,
@@ -75,6 +76,9 @@ def read_mesh(
     mesh = scene.geometry[name].apply_transform(pose) if is_one else scene.to_mesh()
     if not np.isfinite(mesh.vertices).all():
         raise OptionError(f"{path}: a vertex is not finite")
+    farthest = float(np.abs(mesh.vertices).max(initial=0.0))
+    if farthest > FARTHEST:
+        raise OptionError(f"{path}: a vertex is at {farthest:.3g}; expected at most {FARTHEST:g}")
     is_closed = len(mesh.vertices) <= len(mesh.faces) and _is_closed(mesh.faces)
     if not is_closed:
         mesh.merge_vertices(merge_tex=True, merge_norm=True)

@@ -90,7 +90,7 @@ def corrupted(tmp_path_factory):
     (folder / "points.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n")
     (folder / "point.obj").write_text("v -10.0\n", "utf-8")
     (folder / "flat.obj").write_text("v 0 0 0\nv 100 0 0\nv 200 0 0\nf 1 2 3\n")
-    for value in (np.nan, np.inf):
+    for value in (np.nan, np.inf, 2.0**40):
         data = bytearray(written(folder / "a.stl", box()).read_bytes())
         struct.pack_into("<f", data, 84 + 12, value)
         (folder / f"{value}.stl").write_bytes(data)
@@ -112,6 +112,7 @@ def corrupted(tmp_path_factory):
         ("flat.obj", "all of its triangles", {}),
         ("nan.stl", "a vertex is not finite", {}),
         ("inf.stl", "a vertex is not finite", {}),
+        ("1099511627776.0.stl", "a vertex is at 1.1e+12; expected at most 1e+09", {}),
         ("box.ply", "no PLY file .* refers to a missing vertex", {}),
         ("a.iges", r"unknown ending; expected one of \.stl", {}),
         ("a.stl", "'feet'; expected one of mm, cm, m, in", {"unit": "feet"}),
