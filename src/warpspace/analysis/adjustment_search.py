@@ -180,8 +180,8 @@ def least_rms(
         from scipy.optimize import minimize
 
         def square(change: Array) -> tuple[float, Array]:
-            rest = chosen @ change + error
-            return float(rest @ rest), 2.0 * rest @ chosen
+            remaining = chosen @ change + error
+            return float(remaining @ remaining), 2.0 * remaining @ chosen
 
         constraint = {
             "type": "ineq",
@@ -226,13 +226,13 @@ def least_max(
     plane is added.
     """
     if len(indices) == 1:
-        alone = _least_max_of_one(volume, indices[0], bounds[indices[0]], give_up_um)
+        solution = _least_max_of_one(volume, indices[0], bounds[indices[0]], give_up_um)
         if (
-            alone is None
+            solution is None
             or mean_um == np.inf
-            or volume.mean(indices, alone.change)[0] <= mean_um + CLOSE_UM
+            or volume.mean(indices, solution.change)[0] <= mean_um + CLOSE_UM
         ):
-            return alone
+            return solution
     from scipy.optimize import linprog
 
     chosen = volume.response[list(indices)]

@@ -101,9 +101,9 @@ def _divide(
         chosen: NDArray[Any] = np.argsort(-value)[: min(room, np.count_nonzero(value > limit))]
         largest = max(largest, float(np.delete(value, chosen).max(initial=0.0)))
         count, rows = len(vertices), rows[chosen]
-        vertices, kept, added = _halve(vertices, number[chosen])
-        triangles = np.concatenate([triangles, added])
-        triangles[rows] = kept
+        vertices, first, second = _halve(vertices, number[chosen])
+        triangles = np.concatenate([triangles, second])
+        triangles[rows] = first
         halves = np.arange(len(source), len(triangles))
         source = np.concatenate([source, source[rows]])
         rows = np.concatenate([rows, halves])

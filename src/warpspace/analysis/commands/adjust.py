@@ -327,8 +327,8 @@ class AdjustResult(description.Result):
             bounds = f"by at most {', '.join(each)}"
         if not self.analysis.unconstrained:
             has_tolerances = any(map(self.scene.tolerances.get, self.adjustable))
-            kept = ", within tolerance" if has_tolerances else ""
-            bounds += f"{kept}, without a larger mean"
+            tolerance = ", within tolerance" if has_tolerances else ""
+            bounds += f"{tolerance}, without a larger mean"
         yield f"  adjusted: {', '.join(self.adjustable)}; {bounds}"
         worthwhile = self.worthwhile
         idle = [str(i + 1) for i in range(len(self.adjustments)) if i not in worthwhile]

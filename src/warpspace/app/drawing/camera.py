@@ -144,8 +144,8 @@ def clipping(position: Array, points: Array, *, orthographic: bool) -> tuple[flo
 
 def focus(state: AppState) -> tuple[object, ...]:
     """Return the properties that require a new camera: scene, chain, display of the machine."""
-    chain, shown = state.scene.machine.chain, state.machine.shown
-    return Identity(state.origin), chain, shown, state.shows_rotary
+    chain, machine = state.scene.machine.chain, state.machine
+    return Identity(state.origin), chain, machine.shown, state.shows_rotary
 
 
 class TabCamera:

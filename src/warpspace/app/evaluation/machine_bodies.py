@@ -39,8 +39,8 @@ def drawn_bodies(
     state, scene = picture.state, picture.state.scene
     positions, _ = standing(state, turned)
     factor = picture.exaggeration if state.machine.bent and not nominal else 0.0
-    whole = nominal or (state.machine.shown and not state.shows_rotary)
-    only = None if whole else _turning_frames(state)
+    is_whole = nominal or (state.machine.shown and not state.shows_rotary)
+    only = None if is_whole else _turning_frames(state)
     return place_bodies(
         scene, state.view(), factor, only, amplitudes=state.active, positions=positions
     )

@@ -81,16 +81,16 @@ def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> tuple[Pick
 
 def worst_traced(picture: LivePicture) -> tuple[TraceLine, float]:
     """Return the trace with the largest error, and the position of its axis there, degrees."""
-    found: tuple[float, TraceLine, float] | None = None
+    largest: tuple[float, TraceLine, float] | None = None
     for of in picture.traces:
         for number, line in enumerate(of.each()):
-            if found is None or line.largest_um > found[0]:
+            if largest is None or line.largest_um > largest[0]:
                 node = int(np.argmax(np.linalg.norm(line.error_um, axis=-1)))
                 at = float(of.group.coordinates[line.trace.axis][number][node])
-                found = line.largest_um, line, at
-    if found is None:
+                largest = line.largest_um, line, at
+    if largest is None:
         raise ValueError("no traces")
-    return found[1], found[2]
+    return largest[1:]
 
 
 def pick_worst(picture: LivePicture) -> Picked:

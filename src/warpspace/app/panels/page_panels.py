@@ -120,7 +120,7 @@ class Command:
     event: str
     value: str = ""
     keys: tuple[str, ...] = ()  # in the notation of page.js, the most common one first
-    words: str = ""  # further words by which it is found
+    search_terms: str = ""  # further words by which it is found
 
     @property
     def key_label(self) -> str:
@@ -143,7 +143,7 @@ COMMANDS = (
     Command("Play the story", "story:start"),
     Command("Pin a note", "notes:pin", keys=("n",)),
     Command("Notes", "notes:open"),
-    Command("Compare two scenes", "compare:menu", words="difference before after"),
+    Command("Compare two scenes", "compare:menu", search_terms="difference before after"),
     Command("Find an error", "find", keys=("/",)),
     Command("Fit the view", "page:fit", keys=("f",)),
     Command("Component: magnitude of the error", "state:set.component", "norm", ("1",)),
@@ -192,14 +192,12 @@ def _section_commands(sections: Iterable[Section]) -> Iterator[Command]:
     """List the commands that open a section of a task, or choose a standard test."""
     for section in sections:
         label = f"{TASKS[section.task]}: {section.title.lower()}"
-        place, words = f"{section.task}.{section.name}", f"{section.name} {section.sentence}"
-        yield Command(label, "page:section", place, words=words.lower())
+        place, terms = f"{section.task}.{section.name}", f"{section.name} {section.sentence}"
+        yield Command(label, "page:section", place, search_terms=terms.lower())
     for test in map(find_test, bench_names()):
-        label, words = (
-            f"Standard test: {test.title.lower()}",
-            f"{test.name} {test.standard} {test.description}",
-        )
-        yield Command(label, "test:choose", test.name, words=words.lower())
+        label = f"Standard test: {test.title.lower()}"
+        terms = f"{test.name} {test.standard} {test.description}"
+        yield Command(label, "test:choose", test.name, search_terms=terms.lower())
 
 
 class HelpDialog(Dialog):
@@ -219,8 +217,8 @@ class HelpDialog(Dialog):
         def matches(text: str) -> bool:
             return all(word in text for word in search_words)
 
-        found = [c for c in commands if matches(f"{c.label.lower()} {c.words}")]
-        return sorted(found, key=lambda command: not matches(command.label.lower()))
+        matching = [c for c in commands if matches(f"{c.label.lower()} {c.search_terms}")]
+        return sorted(matching, key=lambda command: not matches(command.label.lower()))
 
     def body(self, picture: LivePicture) -> Markup:
         query, scene = picture.state.page.command, picture.state.scene
