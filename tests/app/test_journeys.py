@@ -189,3 +189,39 @@ def test_a_click_asks_why_and_a_saved_scene_holds_what_was_changed(tab):
     tab.until(lambda: tab.state.amplitudes["EXX"] == 0.0)
     tab.give("mine.toml", text.encode(), tab.page.get_by_role("button", name="Open").first.click)
     tab.until(lambda: tab.state.amplitudes["EXX"] == 3.25 and tab.state.picked is not None)
+
+
+def typed_on(tab, key, text):
+    """Type a number while the slider of an error has the focus: one action."""
+    tab.actions += 1
+    tab.page.locator(f"input[type=range][data-set='errors:set.{key}']").focus()
+    tab.page.keyboard.type(text)
+    tab.page.keyboard.press("Enter")
+
+
+def test_the_effect_of_a_rotary_error_in_numbers_and_picture_in_two_actions(tab):
+    tab.actions += 1
+    tab.page.locator(".ws-drawings label", has_text="Rotary axes").click()
+    tab.says("No rotary errors")
+    assert tab.drawn("/rotary/actual") is None
+    typed_on(tab, "EB0C", "20")
+    assert tab.actions <= 2
+    tab.says("Rotary errors up to 10.5 µm, mostly because of the orientation of C about y")
+    tab.until(lambda: tab.drawn("/rotary/actual") is not None)
+    drawn = tab.drawn("/rotary/actual")
+    assert len(drawn.reshape(-1, 3)) > 1000
+    assert tab.drawn("/box/surface") is None  # the volume is hidden
+    row = tab.page.locator("[data-piece='error.EB0C']").inner_text()
+    assert "0.0 µm" not in row
+
+
+def test_a_program_is_played_and_stopped_at_its_worst_block_in_three_actions(tab):
+    program = b"G21 G90 G54\nG0 X-200 Y-150 Z-100\nG1 X200 F500\nG1 Y150\nG1 X-200\nM30\n"
+    tab.give("a.nc", program, tab.page.get_by_role("button", name="Open").first.click)
+    tab.click("Play the program")
+    tab.says("line 3", within="[data-piece=playback]")
+    tab.click("Worst")
+    assert tab.actions <= 3
+    largest = tab.page.locator(".ws-part").inner_text().partition("up to ")[2].partition(" ")[0]
+    tab.says(f"{largest} µm, mostly because Y pitches", within="[data-piece=playback]")
+    tab.says("line 5", within="[data-piece=playback]")

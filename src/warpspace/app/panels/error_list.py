@@ -316,14 +316,19 @@ class ErrorsPanel(Panel):
     def _rank(self, state: AppState, gains: Mapping[str, float]) -> Ranking:
         """Return the present ranking, or a new one if it is out of date."""
         ranking, positions = self._ranking, tuple(state.positions.items())
-        inputs = (Identity(state.origin), tuple(state.amplitudes), state.view_key, positions)
+        view = state.view_key, state.shows_rotary
+        inputs = (Identity(state.origin), tuple(state.amplitudes), *view, positions)
         if ranking is not None and ranking.inputs == inputs:
             before = ranking.amplitudes
             changed = {key for key, value in state.amplitudes.items() if value != before.get(key)}
             if changed <= self._edited and (self._edited or ranking.gains is gains):
                 return ranking
         effects = {key: gains.get(key, 0.0) * abs(at) for key, at in state.amplitudes.items()}
-        order = tuple(sorted(effects, key=lambda key: -effects[key]))
+
+        def rank(key: str) -> tuple[bool, float]:  # those that the drawing shows come first
+            return state.shows_rotary and is_linear(parameter(key).axis), -effects[key]
+
+        order = tuple(sorted(effects, key=rank))
         largest, used = max(effects.values(), default=0.0) or 1.0, used_keys(state)
         self._edited, spans = set(), _spans(state)
         self._ranking = Ranking(inputs, gains, state.amplitudes, order, used, largest, spans)
@@ -524,5 +529,13 @@ def _fits(token: str, row: Parameter) -> bool:
 
 
 def used_keys(state: AppState) -> tuple[str, ...]:
-    """List the errors that are not zero now, or were not in the scene."""
-    return tuple(key for key, value in state.amplitudes.items() if value or state.start[key])
+    """List the errors that are not zero now, or were not in the scene; with those that are drawn.
+
+    The drawing of the rotary axes lists all errors of rotary axes, to be set there.
+    """
+    return tuple(
+        key
+        for key, value in state.amplitudes.items()
+        if value or state.start[key]
+        or (state.shows_rotary and not is_linear(parameter(key).axis))
+    )  # fmt: skip
