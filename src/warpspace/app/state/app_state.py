@@ -419,11 +419,11 @@ class AppState:
         """Open another scene; component, density and switches stay, its part and drawing do not."""
         fresh, unchanged = start_state(scene), {name: getattr(self, name) for name in KEPT_FIELDS}
         of_part = ("part.", "program.")
-        forms = {k: v for k, v in self.forms.items() if not k.startswith(of_part)} | fresh.forms
+        forms = {k: v for k, v in self.forms.items() if not k.startswith(of_part)}
         changed = replace(
             fresh,
             specification=self.specification if scene.limit_um is None else fresh.specification,
-            forms=forms,
+            forms={**forms, **fresh.forms},
             **unchanged,
         )
         return changed.within_reach()
