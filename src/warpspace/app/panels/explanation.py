@@ -49,7 +49,7 @@ class WorstPanel(Section):
     _explanation: tuple[LivePicture, PointExplanation] | None = None
 
     def heading(self, picture: LivePicture) -> str:
-        if picture.is_difference:
+        if picture.is_difference or self._is_nominal(picture):
             return self.title
         kind = self.title if picture.state.picked is None else "This point"
         explanation = self._explain(picture)
@@ -58,6 +58,8 @@ class WorstPanel(Section):
     def body(self, picture: LivePicture) -> Markup:
         if picture.is_difference:
             return quiet(DIFFERENCE)
+        if self._is_nominal(picture):
+            return quiet("No errors: every point is at its nominal position.")
         explanation, controls = self._explain(picture), EMPTY
         if picture.state.picked is not None:
             reset = button("Worst point", "worst:forget", kind="link",
@@ -72,6 +74,9 @@ class WorstPanel(Section):
             controls, _contributions(explanation), _uncertainty(explanation, limit), best,
             details("Details", table, kind="details", data_key="worst.details"),
         ))  # fmt: skip
+
+    def _is_nominal(self, picture: LivePicture) -> bool:
+        return picture.state.picked is None and not picture.field.error_um.any()
 
     def _explain(self, picture: LivePicture) -> PointExplanation:
         if self._explanation is None or self._explanation[0] is not picture:
