@@ -14,6 +14,7 @@ from warpspace.app.drawing.around import draw_surroundings
 from warpspace.app.drawing.box import box
 from warpspace.app.drawing.labels import axis_labels, point_labels
 from warpspace.app.drawing.moving import MovingLayer
+from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.machine_bodies import played_angle, played_position
 from warpspace.app.panels.error_list import _gains
 from warpspace.app.panels.overlay import ControlsPanel, HeadPanel, OrderPanel
@@ -251,3 +252,17 @@ def test_the_stage_moves_the_machine_along_the_program():
     assert not stage.playing
     stage.play(None)
     assert (stage.sample, stage.position) == (None, {})
+
+
+def test_a_comparison_of_rotary_errors_shows_their_change():
+    before = with_pin(ROTARY.with_amplitude("EXC", 4.0))
+    state = put(before.with_amplitude("EXC", 10.0), "comparison.shown", "difference")
+    picture = LIVE.evaluate(state)
+    assert picture.is_difference
+    assert np.linalg.norm(picture.traced_um, axis=1).max() == pytest.approx(6.0)
+    assert legend.largest_words(picture) == "Change of rotary errors up to 6.0 µm"
+    assert picture.scale.high == pytest.approx(6.0, abs=2.0)
+    assert set(draw_surroundings(picture)) == {"/rotary/nominal", "/rotary/actual"}
+    a, b = (LIVE.evaluate(put(state, "comparison.shown", side)) for side in "ab")
+    assert a.scale == b.scale
+    assert a.exaggeration == b.exaggeration == picture.exaggeration

@@ -127,6 +127,12 @@ class LivePicture(Picture):
         """Coloured values of what is drawn: of the volume, or of the traces."""
         return component_values(self.traced_um, self.component) if self.is_rotary else self.values
 
+    @cached_property
+    def scale(self) -> ColourScale:
+        if self.is_rotary and self.colours is None:
+            return choose_scale([self.shown_values], self.component, change=self.is_difference)
+        return super().scale
+
     @property
     def drawn_state(self) -> AppState:
         """The drawn state: the present one, or a side of a comparison."""
