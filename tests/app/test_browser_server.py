@@ -115,6 +115,7 @@ def test_a_tab_with_the_token_lives_on(browser):
             tab.page.evaluate("window.put = ''")
             assert copied.get("token", []) == carried
             assert copied["view"]
+            tab.says("The link works on this computer only", within="#ws-toasts")
             tab.until(lambda: "token" not in tab.page.url)
             tab.press("Escape")
         assert tab.errors == []

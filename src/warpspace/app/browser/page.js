@@ -398,7 +398,9 @@
       showAddress(parameters);
       const address = new URL(location.href);
       if (token) address.searchParams.set("token", token);
-      copyText(address.href, "Link copied", words);
+      const isLocal = ["localhost", "127.0.0.1", "[::1]"].includes(location.hostname);
+      const reach = "The link works on this computer only: it names this computer, not a server.";
+      copyText(address.href, "Link copied", isLocal ? `${words}\n${reach}` : words);
     },
     keys(events) { known.keys = events; },
     // scroll to a note, after the list is opened
