@@ -265,7 +265,6 @@ VISITS = {
     "review_story": Visit(open_story, "review_dvf5000"),
     "review_distance": Visit(measured),
     "part_box": Visit(clamped, "part_on_dvf5000"),
-    "part_program": Visit(programmed, "part_on_dvf5000"),
     "program_playback": Visit(played, "part_on_dvf5000"),
     "uncertainty": Visit(unsure, "uncertain"),
     "errors_row": Visit(opened_row, part="#ws-left"),
