@@ -279,6 +279,8 @@ def test_a_table_that_is_paused_can_stand_there_and_axes_be_held_at_quarters():
     assert 'data-do="state:set.positions.C" data-value="90"' in text
     assert 'data-do="state:set.rotary.held.C" data-value="0,90,180,270"' in text
     assert 'data-do="state:set.rotary.off" data-value="+1"' in text
+    section.context.stage.position = {"B": -25.0}  # another axis was moved by hand
+    assert "state:set.positions.C" not in section.body(LIVE.evaluate(state))
 
 
 # --- A scene alone -------------------------------------------------------------------------------

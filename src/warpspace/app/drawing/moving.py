@@ -131,8 +131,9 @@ class MovingLayer:
 
     def _draw_turning(self) -> None:
         picture, position = self._picture, self.position
-        shapes = {} if self.sample is not None else turned_points(picture, position)
-        if self.sample is not None:
+        if self.sample is None:
+            shapes = turned_points(picture, position)
+        else:
             shapes = program_point(picture, int(self.sample))
         self._turning.draw({**shapes, **machine(picture, position)})
 
@@ -152,8 +153,7 @@ class MovingLayer:
             state = self._picture.state
             self.axis, self.sample = axis or played_axis(state), None
             at = self.position.get(self.axis or "")
-            if axis != self.axis or at is not None:
-                self._turned_deg = played_angle(state, self.axis, at)
+            self._turned_deg = played_angle(state, self.axis, at)
             self._turned_at = time.monotonic()
             return
         self._turned_at = None

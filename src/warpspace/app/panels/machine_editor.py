@@ -99,7 +99,7 @@ class RotarySection(panel.Section):
         if playing or position:
             hint = "Stop and return to the axis position"
             buttons.append(button("Stop", "rotary:stop", hint=hint))
-        if position and not playing:
+        if axis in position and not playing:
             hint, path = "Move the axis to the paused position", f"state:set.positions.{axis}"
             buttons.append(button("Move axes here", path, round(position[axis]), hint=hint))
         return join((
