@@ -140,8 +140,9 @@ def part_html(picture: LivePicture) -> Markup:
 
 
 def _largest_um(picture: LivePicture) -> float:
-    traced = np.linalg.norm(picture.traced_um, axis=-1)
-    return float(traced.max(initial=0.0) if picture.is_rotary else picture.field.norm_um.max())
+    if picture.is_rotary:
+        return float(np.linalg.norm(picture.traced_um, axis=-1).max(initial=0.0))
+    return float(picture.field.norm_um.max())
 
 
 def largest_words(picture: LivePicture) -> str:
