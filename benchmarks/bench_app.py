@@ -60,6 +60,11 @@ CHROMIUM = [
     "--disable-component-update",
     "--disable-sync",
 ]
+# viser would reject the events of the page's own scripts and end the connection
+SILENT = """{
+  const view = window.__viserMutable, send = view.sendMessage;
+  view.sendMessage = message => { if (message.type !== 'WarpspaceEvents') send(message); };
+}"""
 SETTLED_MS = 1500  # until what follows at rest has been sent and drawn, too
 MOVE = """async ([uuid, name, value]) => {
   const m = window.__viserMutable, { bend } = warpspaceMesh;
@@ -200,7 +205,7 @@ class BarePage:
             self.server = viser.ViserServer(host="127.0.0.1", port=8580, verbose=False)
         self.url = f"http://127.0.0.1:{self.server.get_port()}"
         light_scene(self.server.scene)
-        send_script(self.server, page_script())
+        send_script(self.server, f"{page_script()}\n{SILENT}")
         self.server.on_client_connect(lambda client: self.build(client, start, moves))
 
     def build(
