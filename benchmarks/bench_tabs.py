@@ -110,7 +110,7 @@ async def drag_all(app: App, tabs: int, idle: int) -> TabTimes:
     while True:
         await asyncio.sleep(0.1)
         pairs = zip(dragging, sent, strict=True)
-        stale = sum(numbers.get(tab.points) != out[-1][1] for tab, out in pairs)
+        stale = sum(numbers.get(tab.seen[-1][1]) != out[-1][1] for tab, out in pairs)
         if not stale or time.perf_counter() - end > FINAL_S:
             break
     memory = app.memory_mb

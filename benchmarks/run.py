@@ -115,7 +115,7 @@ def main() -> None:
         load = load_words(before, os.getloadavg()[0])
         left_out = [name for name in BENCHMARKS if name not in names]
         output.write_text(page_text(sections, load, left_out), encoding="utf-8")
-    missed = [row.what for section in sections for row in section.rows if not row.is_met]
+    missed = [row.label for section in sections for row in section.rows if not row.is_met]
     if missed:
         sys.exit(f"targets missed: {'; '.join(missed)}")
 

@@ -1,6 +1,7 @@
 """From a state to a picture: field, views, slices, machine, traces, colours, camera, room."""
 
 from dataclasses import replace
+from unittest.mock import MagicMock, Mock
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from warpspace.app.drawing.around import arrows
+from warpspace.app.drawing.box import BoxLayer
 from warpspace.app.drawing.camera import VIEWS, clipping, fit_camera, read_room
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation import machine_bodies
@@ -199,3 +201,14 @@ def test_labels_of_isolines_stand_on_lines_of_their_value():
         axis = int(np.abs(label.outward).argmax())
         side = high if label.outward[axis] > 0 else low
         assert abs(label.at_mm[axis] - side[axis]) < 0.12 * picture.size_mm
+
+
+def test_a_drag_sends_points_and_colours_only():
+    scripts: list[str] = []
+    layer = BoxLayer(MagicMock(), Mock(run_script=scripts.append), LIVE.evaluate(START))
+    for value in (3.0, 6.0, 9.0):
+        layer.show(LIVE.evaluate(START.with_amplitude("EAY", value)))
+    assert [script.partition("(")[0] for script in scripts] == [
+        "warpspaceMesh.open", *["warpspaceMesh.bend"] * 3
+    ]  # fmt: skip
+    assert max(map(len, scripts[1:])) < 60_000

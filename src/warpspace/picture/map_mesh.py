@@ -109,6 +109,8 @@ def _collect(patches: list[tuple[MapPatch, Index, Index]]) -> MapMesh:
     values = [part.values.reshape(-1).take(used) for part, used, _ in patches]
     faded = [part.faded.reshape(-1)[at] for part, at, _ in patches if part.faded is not None]
     fading = np.concatenate(faded) if faded else None  # all patches have it, or none
+    if len(patches) == 1:  # the same triangles for every picture of a grid
+        return MapMesh(vertices[0], patches[0][2], values[0], fading)
     first = np.cumsum([0, *map(len, vertices)])
     cells = [cells + at for (_, _, cells), at in zip(patches, first, strict=False)]
     return MapMesh(np.concatenate(vertices), np.concatenate(cells), np.concatenate(values), fading)
