@@ -333,7 +333,7 @@ def above_limit(
 ) -> tuple[tuple[Array, Index], tuple[Array, Index]]:
     """Find the line on which values, [N], are zero, and hatch the surface where they are positive.
 
-    Returns ends of lines, [S, 2, 3], mm, and their triangles, [S]: of the line, and of the hatching.
+    Returns ends of pieces, [S, 2, 3], mm, and their triangles, [S]: of the line, of the hatching.
     """
     reach = 2.0 * float(np.abs(above).max(initial=1.0))  # of which only zero is a multiple
     line = level_lines(above, reach, triangles, nodes_mm)
