@@ -132,5 +132,5 @@ def test_every_kind_of_error_has_its_pictogram():
     assert shown["EA0Z"] == ["squareness"]
     assert shown["EAX"] == ["roll"]
     assert shown["EX0C"] == ["location"]
-    drawn = re.findall(r'(\w+): "M', script_source("pictograms"))
+    drawn = re.findall(r'(\w+): "M', script_source("pictograms.js"))
     assert {kind for kinds in shown.values() for kind in kinds} == {*drawn}
