@@ -5,6 +5,7 @@ import re
 import pytest
 
 from app.parts import LIVE, lone_part
+from warpspace.app.browser.page import script_source
 from warpspace.app.panels.conventions import with_reference
 from warpspace.app.panels.error_list import ErrorsPanel, find_parameters
 from warpspace.app.state.app_state import start_state
@@ -123,3 +124,13 @@ def test_every_parameter_is_found_by_its_key_symbol_and_name():
         assert key in find_parameters(row.name, KEYS)
     assert find_parameters("   ", KEYS) == KEYS
     assert find_parameters("x" * 1_000_000, KEYS) == ()
+
+
+def test_every_kind_of_error_has_its_pictogram():
+    rows = Column().do("none")
+    shown = {key: re.findall(r'href="#ws-kind-(\w+)"', rows[f"error.{key}"]) for key in KEYS}
+    assert shown["EA0Z"] == ["squareness"]
+    assert shown["EAX"] == ["roll"]
+    assert shown["EX0C"] == ["location"]
+    drawn = re.findall(r'(\w+): "M', script_source("pictograms.js"))
+    assert {kind for kinds in shown.values() for kind in kinds} == {*drawn}

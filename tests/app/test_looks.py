@@ -1,6 +1,7 @@
 """From a state to a picture: field, views, slices, machine, traces, colours, camera, room."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from unittest.mock import MagicMock, Mock
 
 import numpy as np
@@ -9,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from warpspace.app.drawing.around import arrows
-from warpspace.app.drawing.box import BoxLayer
+from warpspace.app.drawing.box import LIMIT_NODES, BoxLayer, limit_shapes
 from warpspace.app.drawing.camera import VIEWS, clipping, fit_camera, read_room
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation import machine_bodies
@@ -212,3 +213,52 @@ def test_a_drag_sends_points_and_colours_only():
         "warpspaceMesh.open", *["warpspaceMesh.bend"] * 3
     ]  # fmt: skip
     assert max(map(len, scripts[1:])) < 60_000
+
+
+@pytest.mark.parametrize("surface", ["surface", "cut", "slices"])
+def test_the_surface_is_hatched_where_the_error_is_above_the_limit(surface):
+    start = replace(START, nodes=9)
+    assert limit_shapes(LIVE.evaluate(start)) == {}  # no limit is set
+    limited = put(put(start, "look.surface", surface), "specification.limit_um", "30")
+    picture = LIVE.evaluate(limited)
+    line, hatching = (limit_shapes(picture)[name].assigned["points"] for name in LIMIT_NODES)
+    nodes = np.concatenate([part.drawn_mm.reshape(-1, 3) for part in picture.slices or [picture]])
+    values = np.concatenate([part.values.ravel() for part in picture.slices or [picture]])
+    at_line, at_hatching = (
+        values[np.linalg.norm(nodes[:, None] - points.mean(axis=1), axis=-1).argmin(axis=0)]
+        for points in (line, hatching)
+    )
+    assert np.abs(at_line - 30.0).max() < 4.0  # of the node next to it
+    assert at_hatching.min() > 26.0
+    for path, value in (("look.pass_fail", "1"), ("component", "x"), ("look.drawing", "rotary"),
+                        ("look.surface", "grid"), ("look.quantity", "orientation")):  # fmt: skip
+        assert limit_shapes(LIVE.evaluate(put(limited, path, value))) == {}
+
+
+class _Scene:
+    """A scene of viser that has nodes, and no page."""
+
+    def __getattr__(self, _):
+        return lambda *_, **__: SimpleNamespace(visible=True)
+
+
+def test_the_hatching_does_not_follow_a_drag():
+    pictures = [
+        LIVE.evaluate(put(put(START, "specification.limit_um", "30"), "amplitudes.EA0Z", value))
+        for value in ("33.9", "36", "38")
+    ]
+    page = SimpleNamespace(run_script=lambda _: None)
+    layer = BoxLayer(_Scene(), page, pictures[0])
+    drawn = layer._nodes._drawn
+
+    def are_visible():
+        return {drawn[name][0].visible for name in LIMIT_NODES}
+
+    assert are_visible() == {True}
+    for picture in pictures[1:]:
+        layer.show(picture)
+        assert are_visible() == {False}
+    layer.synchronise(pictures[-1])
+    assert are_visible() == {True}
+    points = limit_shapes(pictures[-1])[LIMIT_NODES[0]].assigned["points"]
+    assert np.array_equal(drawn[LIMIT_NODES[0]][0].points, points)

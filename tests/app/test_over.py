@@ -8,7 +8,7 @@ import pytest
 
 import warpspace
 from app.parts import LIVE, lone_part
-from warpspace.app.documents.legend import legend_html, marks, within_limit_words
+from warpspace.app.documents.legend import legend_html, marks, ticks, within_limit_words
 from warpspace.app.drawing.colours import colour_levels
 from warpspace.app.drawing.labels import axes, point_labels
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
@@ -24,7 +24,7 @@ from warpspace.app.panels.overlay import (
 from warpspace.app.state.app_state import NOBODY, Side, start_state
 from warpspace.app.state.tree import put
 from warpspace.exceptions import SceneError
-from warpspace.geometry.colour import component_values
+from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.geometry.surfaces import deform
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ToleranceSet
@@ -78,6 +78,26 @@ def test_names_beside_the_colour_bar_keep_apart():
         placed = [mark.name_at for mark in marks(picture)]
         assert min(np.diff(placed)) > 0.06
         assert placed[-1] <= (1.07 if limit == 500.0 else 1.0)  # above the bar
+
+
+def test_the_colour_bar_has_round_numbers_and_the_limit_as_a_mark():
+    picture = LIVE.evaluate(limited(40.0))
+    assert [text for text, _ in ticks(picture.scale)] == ["0", "20", "40", "60"]
+    heights = {mark.name: mark.at for mark in marks(picture)}
+    assert heights["limit"] == pytest.approx(40.0 / 60.0)
+    legend = legend_html(picture)
+    assert "limit 40<" in legend
+    assert 'class="ws-hatched" style="bottom:66.67%"' in legend
+    beyond = legend_html(LIVE.evaluate(limited(85.0)))
+    assert "limit 85 ↑" in beyond
+    assert "ws-hatched" not in beyond
+    for low, high in ((0.0, 37.0), (-12.5, 12.5), (0.0, 0.003), (0.0, 1234.0)):
+        of_scale = ticks(ColourScale(low, high))
+        placed = [at for _, at in of_scale]
+        assert 3 <= len(of_scale) <= 8
+        assert min(np.diff(placed)) > 0.07
+        for text, at in of_scale:
+            assert float(text.replace("−", "-")) == pytest.approx(low + at * (high - low))
 
 
 def test_a_scene_file_carries_the_limit():

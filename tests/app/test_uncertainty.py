@@ -161,3 +161,5 @@ def test_what_was_never_measured_is_said_and_dotted():
     assert len(dotted) == 25  # the nodes at Z −100; those at −50 were reached
     off = LIVE.evaluate(state_of(look__unmeasured="0"))
     assert "/uncertainty/unmeasured" not in draw_surroundings(off)
+    assert "</span> never measured" in legend.legend_html(picture)
+    assert "never measured" not in legend.legend_html(off)

@@ -297,6 +297,59 @@ def isolines(
     return polylines
 
 
+def level_lines(
+    field: Array, step: float, triangles: Index, at_nodes: Array
+) -> tuple[Array, Index]:
+    """Find the lines on which a field, [N], is a multiple of a step.
+
+    Returns quantities, known at the nodes, [N, k], at the ends of each piece of line, [S, 2, k],
+    and the triangle of each piece, [S]. All are linear within a triangle.
+    """
+    ordered = np.take_along_axis(triangles, np.argsort(field[triangles], axis=1), axis=1)
+    low, middle, high = (field[ordered] / step).T
+    first = np.ceil(low)
+    counts = np.maximum(np.floor(high) - first + 1.0, 0.0).astype(np.intp)
+    of = np.repeat(np.arange(len(triangles)), counts)
+    level = first[of] + np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
+    lowest, between, highest = ordered[of].T
+    is_lower = level < middle[of]
+    sides = (
+        (lowest, highest),
+        (
+            np.where(is_lower, lowest, between),
+            np.where(is_lower, between, highest),
+        ),
+    )
+    ends: list[Array] = []
+    for start, end in sides:
+        span = (field[end] - field[start]) / step
+        share = (level - field[start] / step) / np.where(span > 0.0, span, np.inf)
+        ends.append(at_nodes[start] + share[:, None] * (at_nodes[end] - at_nodes[start]))
+    return np.stack(ends, axis=1), of
+
+
+def above_limit(
+    nodes_mm: Array, above: Array, triangles: Index, spacing_mm: float
+) -> tuple[tuple[Array, Index], tuple[Array, Index]]:
+    """Find the line on which values, [N], are zero, and hatch the surface where they are positive.
+
+    Returns ends of pieces, [S, 2, 3], mm, and their triangles, [S]: of the line, of the hatching.
+    """
+    reach = 2.0 * float(np.abs(above).max(initial=1.0))  # of which only zero is a multiple
+    line = level_lines(above, reach, triangles, nodes_mm)
+    hatched = np.flatnonzero((above[triangles] > 0.0).any(axis=1))
+    at_nodes = np.concatenate([nodes_mm, above[:, None]], axis=1)
+    ends, of = level_lines(nodes_mm.sum(axis=1), spacing_mm, triangles[hatched], at_nodes)
+    positive = (ends[..., 3] > 0.0).any(axis=1)
+    ends, of = ends[positive], hatched[of[positive]]
+    start, end = ends[:, 0, 3], ends[:, 1, 3]
+    crossing = start / np.where(start == end, 1.0, start - end)
+    shares = np.stack([np.where(start < 0.0, crossing, 0.0), np.where(end < 0.0, crossing, 1.0)], 1)
+    shares = np.clip(shares, 0.0, 1.0)[..., None]
+    hatching = ends[:, :1, :3] + shares * (ends[:, 1:, :3] - ends[:, :1, :3])
+    return line, (hatching, of)
+
+
 def _bilinear(corners: Array, row: Array, column: Array) -> Array:
     i = np.clip(np.floor(row).astype(int), 0, corners.shape[0] - 2)
     j = np.clip(np.floor(column).astype(int), 0, corners.shape[1] - 2)

@@ -85,7 +85,7 @@ def _exaggeration_frame(scene: Scene, figure: FigureSettings, phase: float) -> D
     scale = picture.scale
     title = f"Volumetric error: {scene.title}"
     facts = scene_facts(picture, factor)
-    legend = map_legend(isoline_words(scale))
+    legend = map_legend(isoline_words(scale), picture.exceeded_um)
     sheet = start_sheet("exaggeration", figure, title, facts, [scene], legend, exact=True)
     camera = fit_map(sheet.canvas, [picture, largest], sheet.content, figure.view)
     drawn = draw_map(sheet.canvas, picture, sheet.content, figure.view, projection=camera)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from warpspace.geometry.surfaces import (
     THICKNESS,
     Index,
+    above_limit,
     is_thin,
     isoline_levels,
     isolines,
@@ -148,6 +149,26 @@ def isoline_pieces(picture: Picture) -> Pieces:
             for _, line in isolines(face, nodes, values, levels)
         ]
     return _joined(lines)
+
+
+HATCH = 0.05  # distance of the hatching along a line parallel to an edge, relative to the longest
+
+
+def limit_pieces(picture: Picture, limit: float) -> tuple[Pieces, Pieces]:
+    """Collect the line at a limit of the values, and the hatching above it, [S, 2, 3] each, mm."""
+    lines: tuple[list[Pieces], list[Pieces]] = ([], [])
+    for part in map_parts(picture):
+        nodes_mm, above = part.drawn_mm.reshape(-1, 3), part.values.reshape(-1) - limit
+        surface, patches = part.drawn_of.surface, part.drawn_of.faces
+        counts = [2 * (face.shape[0] - 1) * (face.shape[1] - 1) for face in patches]
+        normals = np.repeat(part.drawn_of.normals * part.directions, counts, axis=0)
+        triangles = surface.nodes[surface.triangles]
+        drawn = above_limit(nodes_mm, above, triangles, HATCH * picture.size_mm)
+        for pieces, (ends, of) in zip(lines, drawn, strict=True):
+            lifts = (ISOLINE_LIFT * lift * normals[of][:, None] for lift in part.lifts)
+            pieces += [(ends + off).astype(np.float32) for off in lifts]
+    line, hatching = map(np.concatenate, lines)
+    return line, hatching
 
 
 def _joined(parts: list[Pieces]) -> Pieces:

@@ -106,6 +106,8 @@ class Picture:
     significant: bool = False  # whether colours fade where an error is not above its U95
     # limit of |E|; colours fade where the verdict is undecided
     limit_um: float | None = None
+    # limit of the coloured values, above which the surface is hatched; None for none
+    hatch_um: float | None = None
     # colour scale, for instance shared with other pictures; None for round ends around all values
     colours: ColourScale | None = None
     cut: bool = False  # whether the octant towards the operator is cut away
@@ -137,6 +139,12 @@ class Picture:
     def size_mm(self) -> float:
         """Reference length for the size of marks, mm: the longest edge of the volume."""
         return self.grid.longest_edge_mm
+
+    @property
+    def exceeded_um(self) -> float | None:
+        """The limit above which the surface is hatched, if a value is above it."""
+        limit = self.hatch_um
+        return limit if limit is not None and float(self.values.max()) > limit else None
 
     @cached_property
     def statistics(self) -> Statistics:
@@ -229,7 +237,7 @@ def subtract_pictures(minuend: P, subtrahend: Picture) -> P:
     quantity = "position" if minuend.quantity == "uncertainty" else minuend.quantity
     return replace(
         minuend, field=minuend.field - subtrahend.field, quantity=quantity, uncertainty=None,
-        colours=None, is_difference=True,
+        colours=None, hatch_um=None, is_difference=True,
     )  # fmt: skip
 
 
@@ -423,6 +431,7 @@ def evaluate_picture(
         quantity=quantity,
         uncertainty=uncertainty,
         colours=colours,
+        hatch_um=scene.limit_um if (component, quantity) == ("norm", "position") else None,
         conditions=(*direction_words(scene), *placed_words(view), *orders, *conditions),
         scene=scene,
     )

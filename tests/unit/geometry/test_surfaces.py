@@ -8,6 +8,7 @@ import pytest
 from warpspace.app.evaluation.point_explanation import pick_point, pick_surface
 from warpspace.geometry.colour import build_scale
 from warpspace.geometry.surfaces import (
+    above_limit,
     box_edges,
     crease_lines,
     cut_faces,
@@ -80,6 +81,31 @@ def test_flat_volumes(shape, faces, creases):
     assert len(found) == faces
     assert len(crease_lines(found, shape)) == creases
     assert is_thin(shape) == (faces == 0) == (len(outer_surface(shape).triangles) == 0)
+
+
+def test_the_surface_is_hatched_above_a_limit_only_and_evenly():
+    shape, spacing = (7, 5, 3), 0.25
+    nodes = np.moveaxis(np.indices(shape, dtype=float), 0, -1).reshape(-1, 3)
+    surface = outer_surface(shape)
+    triangles = surface.nodes[surface.triangles]
+    above = nodes[:, 0] - 2.6
+    (line, of_line), (hatching, of) = above_limit(nodes, above, triangles, spacing)
+    assert np.ptp(line[..., 0]) < 1e-12
+    assert line[0, 0, 0] == pytest.approx(2.6)
+    # around the box, once
+    assert np.linalg.norm(np.diff(line, axis=1), axis=-1).sum() == pytest.approx(2 * (4 + 2))
+    assert hatching[..., 0].min() == pytest.approx(2.6)
+    assert hatching[..., 0].max() == 6.0
+    levels = hatching.sum(axis=-1) / spacing
+    assert np.abs(levels - np.rint(levels)).max() < 1e-9
+    assert {*np.rint(levels).ravel()} == {*range(11, 49)}
+    for ends, triangle in ((line, of_line), (hatching, of)):  # in the planes of their triangles
+        corners = nodes[triangles[triangle]]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        away = np.einsum("nek,nk->ne", ends - corners[:, :1], normals)
+        assert np.abs(away).max() < 1e-12
+    none = above_limit(nodes, above - 9.0, triangles, spacing)
+    assert [len(ends) for ends, _ in none] == [0, 0]
 
 
 def test_levels_are_the_ticks_inside_the_scale():

@@ -8,6 +8,7 @@ from markupsafe import Markup
 
 from warpspace.analysis.statistics import P95, share_below, share_within, volume_mean
 from warpspace.app.browser.html import EMPTY, fill, join, lowered, number, tag
+from warpspace.app.drawing.around import unmeasured_mm
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.drawing.labels import axis_labels, point_labels, trace_label
 from warpspace.app.drawing.shapes import SCENE_PER_MM
@@ -16,7 +17,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import worst_traced
 from warpspace.app.state.app_state import AppState
 from warpspace.field.evaluate import placed_words, second_order_words
-from warpspace.geometry.colour import ColourScale, component_values
+from warpspace.geometry.colour import ColourScale, component_values, tick_values
 from warpspace.picture import formatting
 from warpspace.picture.comparison import conditions_of_both
 from warpspace.scene.model import second_order
@@ -30,22 +31,23 @@ NOTHING_TRACED = (
 )
 GEOMETRY_ONLY = "Geometry only: no forces, heat, wear or servo"
 APART = 15.5 / 240.0  # smallest distance of two labels of the colour bar, relative to its height
+MOST_TICKS = 5.0  # intervals between round values
 _STOPS = 33
 
 
 class LegendMark(NamedTuple):
     """A label of the colour bar; heights are relative to the bar."""
 
-    name: str  # empty for the ends
+    name: str
     text: str
     at: float
     name_at: float  # of the label, separated from others
 
 
 def marks(picture: LivePicture) -> list[LegendMark]:
-    """List ends, limit and statistics of the coloured quantity, in ascending order."""
+    """List limit and statistics of the coloured quantity, in ascending order."""
     low, high = picture.scale.low, picture.scale.high
-    named = sorted([("", low), ("", high), *marked(picture).items()], key=lambda mark: mark[1])
+    named = sorted(marked(picture).items(), key=lambda mark: mark[1])
     values = np.array([value for _, value in named])
     at: list[float] = ((np.clip(values, low, high) - low) / (high - low)).tolist()
     placed, beyond = list(at), int((values > high).sum())
@@ -54,10 +56,22 @@ def marks(picture: LivePicture) -> list[LegendMark]:
     for i in reversed(range(len(placed))):
         placed[i] = min(placed[i], 1.0 - APART * (len(placed) - 1 - beyond - i))
     spelt = [
-        f"{name} {spell_short(value) if name in ('', 'limit') else number(value)}".strip()
+        f"{name} {spell_short(value) if name == 'limit' else number(value)}{_beyond(value, high)}"
         for name, value in named
     ]
     return list(map(LegendMark, [name for name, _ in named], spelt, at, placed))
+
+
+def _beyond(value: float, high: float) -> str:
+    return " ↑" if value > high else ""
+
+
+def ticks(scale: ColourScale) -> list[tuple[str, float]]:
+    """List the ends and round values of a scale, with their heights relative to the bar."""
+    span, apart = scale.high - scale.low, 1.2 * APART
+    inner = ((tick - scale.low) / span for tick in tick_values(scale.low, scale.high, MOST_TICKS))
+    heights = [0.0, *(at for at in inner if apart < at < 1.0 - apart), 1.0]
+    return [(spell_short(scale.low + at * span), at) for at in heights]
 
 
 def marked(picture: LivePicture) -> dict[str, float]:
@@ -81,25 +95,37 @@ def marked(picture: LivePicture) -> dict[str, float]:
 
 
 def legend_html(picture: LivePicture) -> Markup:
-    scale, named = picture.scale, marks(picture)
+    scale, named, limit = picture.scale, marks(picture), picture.exceeded_um
     names = join(
         tag("i", mark.text, style=f"bottom:{100.0 * mark.name_at:.2f}%",
-            class_="ws-mark" if mark.name else "ws-tick", data_mark=mark.name or None)
+            class_="ws-mark", data_mark=mark.name)
         for mark in named
     )  # fmt: skip
+    numbers = join(
+        tag("i", text, style=f"bottom:{100.0 * at:.2f}%", class_="ws-tick")
+        for text, at in ticks(scale)
+    )
     leads = join(
         fill('<path d="M0 {y}L3 {y}L10 {to}"/>', y=f"{100.0 - 100.0 * mark.at:.1f}",
              to=f"{100.0 - 100.0 * mark.name_at:.1f}")
-        for mark in named if mark.name and mark.name_at <= 1.0
+        for mark in named if mark.name_at <= 1.0
     )  # fmt: skip
+    hatched = EMPTY
+    if limit is not None:
+        bottom = f"bottom:{100.0 * min(limit / scale.high, 1.0):.2f}%"
+        hatched = tag("i", "", class_="ws-hatched", style=bottom, title="Above the limit")
+    keys = [*map(lowered, faded_words(picture))]
+    if unmeasured_mm(picture).size:
+        keys.append(Markup('<span class="ws-dot">●</span> never measured'))
     return fill(
         '<b>{label} [{unit}]</b><div class="ws-scale" role="img" aria-label="{words}">'
-        '<i class="ws-colours" style="background:linear-gradient(to top,{colours})"></i>'
-        '<svg viewBox="0 0 10 100" preserveAspectRatio="none">{leads}</svg>{names}</div>{faded}',
-        faded=join(tag("p", lowered(said), class_="ws-tiny") for said in faded_words(picture)),
-        label=lowered(scale.label), unit=scale.unit, leads=leads, names=names,
+        '<i class="ws-colours" style="background:linear-gradient(to top,{colours})"></i>{hatched}'
+        '<svg viewBox="0 0 10 100" preserveAspectRatio="none">{leads}</svg>{numbers}{names}</div>'
+        "{keys}",
+        keys=join(tag("p", key, class_="ws-tiny") for key in keys),
+        label=lowered(scale.label), unit=scale.unit, leads=leads, names=names, hatched=hatched,
         words=f"Colours from {spell_short(scale.low)} to {spell_short(scale.high)} {scale.unit}: "
-        + ", ".join(mark.text for mark in named if mark.name),
+        + ", ".join(mark.text for mark in named), numbers=numbers,
         colours=_stops(scale),
     )  # fmt: skip
 

@@ -27,7 +27,7 @@ from warpspace.app.browser.page import script_source
 from warpspace.app.documents import legend
 from warpspace.app.documents.scene_file import KnownScenes, reopened
 from warpspace.app.drawing.around import ACCENT, POINT_MARKER, draw_labels, draw_surroundings
-from warpspace.app.drawing.box import box, line_facts, packed
+from warpspace.app.drawing.box import box, limit_shapes, line_facts, packed
 from warpspace.app.drawing.camera import CameraMemory, fit_camera
 from warpspace.app.drawing.colours import colour_levels, level_colours
 from warpspace.app.drawing.labels import axes_room_mm, note_labels, point_labels
@@ -89,7 +89,8 @@ def build_offline_html(
     """Build the page: the interactive scene with colour bar, statistics and exaggeration."""
     conditions = list(legend.picture_conditions(picture))
     about = {**(provenance or {}), **({"conditions": conditions} if conditions else {})}
-    shapes = {**box(picture), **draw_surroundings(picture), **draw_labels(picture)}
+    drawn = box(picture), limit_shapes(picture), draw_surroundings(picture), draw_labels(picture)
+    shapes = {name: shape for shapes in drawn for name, shape in shapes.items()}
     steps = [PageStep(picture, camera or _usual_camera(picture))]
     return _build_page(picture.title, steps, shapes, about)
 

@@ -222,14 +222,11 @@ def _uncertainty(picture: LivePicture) -> Shapes:
 
     The extent of an ellipsoid along a direction is U95 of the error along it, exaggerated.
     """
-    uncertainty, look, scene = picture.uncertainty, picture.state.look, picture.drawn_state.scene
+    uncertainty, look = picture.uncertainty, picture.state.look
     shapes: dict[str, SceneNode | None] = {}
-    if uncertainty is not None and scene.covariance is not None and look.unmeasured:
-        surface = picture.topology.surface.nodes
-        outside = scene.covariance.outside(picture.grid.coordinates, picture.shape)
-        unmeasured = surface[outside.reshape(-1)[surface]]
-        at = picture.drawn_mm.reshape(-1, 3)[unmeasured]
-        shapes["/uncertainty/unmeasured"] = dots(at, UNMEASURED * picture.size_mm, GREY)
+    unmeasured = dots(unmeasured_mm(picture), UNMEASURED * picture.size_mm, GREY)
+    if unmeasured is not None:
+        shapes["/uncertainty/unmeasured"] = unmeasured
     if uncertainty is None or not uncertainty.errors.is_known or not look.ellipsoids:
         return shapes
     chosen, picked = corners(picture.shape), picture.state.picked
@@ -245,6 +242,21 @@ def _uncertainty(picture: LivePicture) -> Shapes:
         body = ellipsoid(middle, factor**2 * square, ACCENT, SEEN_THROUGH)
         shapes[f"/uncertainty/ellipsoid{number}"] = body
     return shapes
+
+
+def unmeasured_mm(picture: LivePicture) -> Array:
+    """Return drawn points of the surface whose axis positions no measurement covers, [n, 3]."""
+    covariance, look = picture.drawn_state.scene.covariance, picture.state.look
+    if (
+        picture.uncertainty is None
+        or covariance is None
+        or picture.is_rotary
+        or not look.unmeasured
+    ):
+        return np.zeros((0, 3))
+    surface = picture.topology.surface.nodes
+    outside = covariance.outside(picture.grid.coordinates, picture.shape).reshape(-1)
+    return picture.drawn_mm.reshape(-1, 3)[surface[outside[surface]]]
 
 
 def turned_points(picture: LivePicture, position: dict[str, float]) -> Shapes:

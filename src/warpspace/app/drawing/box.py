@@ -31,6 +31,8 @@ SURFACE = "/box/surface"
 FADED = 0.85  # share of grey in a faded colour
 DASH, GAP = 0.022, 0.014
 """Dash and gap of the nominal box, relative to its longest edge."""
+LIMIT_NODES = ("/limit/line", "/limit/hatching")
+LIMIT: Rgb = (179, 38, 30)  # as the mark of the colour bar
 ISOLINES: tuple[Rgb, Rgb] = ((226, 230, 236), (60, 68, 80))
 """Contrast with all colours of a sequential scale, and of a diverging one."""
 
@@ -89,11 +91,21 @@ def box(picture: LivePicture) -> Shapes:
     return shapes
 
 
+def limit_shapes(picture: LivePicture) -> Shapes:
+    """Draw the line at the limit, and the hatching of the surface above it."""
+    limit = picture.hatch_um
+    if limit is None or picture.state.look.surface == "grid" or picture.is_rotary:
+        return {}
+    line, hatching = map_mesh.limit_pieces(picture, limit)
+    drawn = lines(line, LIMIT, 2.6), lines(hatching, LIMIT, 1.0)
+    return dict(zip(LIMIT_NODES, drawn, strict=True))
+
+
 class BoxLayer:
     """The box in the drawing.
 
     While only errors change, only points and colours are sent (`browser/mesh.js`); the
-    nodes of viser are updated by `synchronise`.
+    nodes of viser are updated, and the limit is drawn, by `synchronise`.
     """
 
     def __init__(self, scene: SceneApi, page: Page, picture: LivePicture) -> None:
@@ -103,8 +115,9 @@ class BoxLayer:
 
     def show(self, picture: LivePicture) -> None:
         if not only_bent(self._full, picture):
-            self._show_all(picture)
+            self._show_all(picture, settled=False)
             return
+        self._nodes.hide(LIMIT_NODES)
         mesh, scale = map_mesh.map_mesh(picture), picture.scale
         opened = Identity(mesh.triangles), scale.diverging, Identity(picture.grid.nominal_mm)
         if opened != self._opened:
@@ -122,9 +135,10 @@ class BoxLayer:
         if self._behind:
             self._show_all(picture)
 
-    def _show_all(self, picture: LivePicture) -> None:
-        self._full, self._behind = picture, False  # of viser's nodes
-        self._nodes.draw(box(picture))
+    def _show_all(self, picture: LivePicture, *, settled: bool = True) -> None:
+        # of viser's nodes; the limit is too slow to follow a drag
+        self._full, self._behind = picture, not settled and picture.hatch_um is not None
+        self._nodes.draw({**box(picture), **(limit_shapes(picture) if settled else {})})
 
 
 def only_bent(drawn: LivePicture, picture: LivePicture) -> bool:

@@ -25,7 +25,7 @@ from warpspace.units import MICROMETRE, MINUS, MM_PER_UM, Array
 AWAY = 0.13
 """Distance of the axes from the nominal box, relative to its longest edge."""
 TICK = 0.022
-MAX_TICKS = 6
+MAX_TICKS = 4
 LEVER_AT = 0.25  # place of the lever's label between point and frame
 
 

@@ -42,12 +42,15 @@ class Nodes:
 
     def draw(self, shapes: Shapes) -> None:
         """Draw shapes and hide all others; unchanged properties are not sent."""
-        for name, (handle, _) in self._drawn.items():
-            if shapes.get(name) is None and handle.visible:
-                handle.visible = False
+        self.hide([name for name in self._drawn if shapes.get(name) is None])
         for name, shape in shapes.items():
             if shape is not None:
                 self._drawn[name] = self._handle(name, shape), shape
+
+    def hide(self, names: Sequence[str]) -> None:
+        for name in names:
+            if name in self._drawn and self._drawn[name][0].visible:
+                self._drawn[name][0].visible = False
 
     def _handle(self, name: str, shape: SceneNode) -> Any:
         drawn = self._drawn.get(name)

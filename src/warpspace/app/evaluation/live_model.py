@@ -70,8 +70,11 @@ class LiveModel:
             "quantity": quantity,
             "significant": state.look.significant,
         }
-        if state.look.pass_fail and (state.component, quantity) == ("norm", "position"):
-            common["limit_um"] = state.specification.limit_um
+        if (state.component, quantity) == ("norm", "position") and not state.shows_rotary:
+            if state.look.pass_fail:
+                common["limit_um"] = state.specification.limit_um
+            else:
+                common["hatch_um"] = state.limit_um
         traced = tuple(
             TraceLines(group, own.nominal_mm, error, factor)
             for (group, own), error in zip(traces, errors, strict=True)

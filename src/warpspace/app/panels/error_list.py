@@ -435,11 +435,13 @@ def _row(
         '<div class="{kind}" id="ws-error-{key}" data-do="errors:row" data-value="{key}"'
         ' title="{symbol}, {title}: {quantity}"><span>{effect} µm</span><b>{key}</b> {title}</div>'
         '<div class="ws-effect"><i style="width:{share}%"></i></div>'
-        '<div class="ws-error-set" title="{hint}">{slider}'
+        '<div class="ws-error-set" title="{hint}">'
+        '<svg class="ws-kind" aria-hidden="true"><use href="#ws-kind-{pictogram}"/></svg>{slider}'
         '<span class="ws-edit" id="ws-box-{key}" data-box="{name}" data-text="{typed}"'
         ' data-label="{key} in {unit}">{text}</span><span class="ws-unit">{unit}</span></div>',
         kind="ws-error-head off" if effect is None else "ws-error-head", key=key, name=name,
         symbol=row.symbol, quantity=row.kind.value, title=row.name, unit=row.unit,
+        pictogram=row.name.partition(" ")[0],
         effect="–" if effect is None else html.number(effect), share=f"{100.0 * share:.1f}",
         typed=spell_typed(value), text=text,
         hint=f"{row.name}: {hint}. Drag, or type a number.",

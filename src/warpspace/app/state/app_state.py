@@ -332,6 +332,12 @@ class AppState:
         return self.look.drawing == "rotary" and not all(map(is_linear, self.scene.machine.axes))
 
     @property
+    def limit_um(self) -> float | None:
+        """The limit of |E| of the scene or the user; None if none is set."""
+        limit = self.specification.limit_um
+        return None if self.scene.limit_um is None and limit == START_UM else limit
+
+    @property
     def origin(self) -> Scene:
         """The scene as opened, which reset returns to."""
         return self.loaded or self.scene
@@ -375,7 +381,7 @@ class AppState:
         return function.with_amplitude(self.amplitudes[key])
 
     def resulting_scene(self) -> Scene:
-        scene, limit = self.scene, self.specification.limit_um
+        scene = self.scene
         keys = [k for k, at in self.amplitudes.items() if at or k in scene.errors.functions]
         scene_positions = scene.workspace.positions
         moved = {axis: at for axis, at in self.positions.items() if at != scene_positions.get(axis)}
@@ -387,7 +393,7 @@ class AppState:
             exaggeration=self.exaggeration,
             placed=self.placed,
             review=self.review,
-            limit_um=None if scene.limit_um is None and limit == START_UM else limit,
+            limit_um=self.limit_um,
         )
 
     def active_scene(self) -> Scene:

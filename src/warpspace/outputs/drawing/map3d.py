@@ -30,6 +30,7 @@ from warpspace.outputs.drawing.off_screen import (
 )
 from warpspace.outputs.drawing.settings import SIZES
 from warpspace.outputs.drawing.sheet import DrawnMap
+from warpspace.picture.map_mesh import HATCH
 from warpspace.picture.model import Picture, map_faces
 from warpspace.units import MICROMETRE, Array, spell, spell_short
 
@@ -300,6 +301,13 @@ def _draw_surface_lines(stage: Stage, faces: list[surfaces.Index]) -> None:
         width = SIZES.line if diverging and level == 0.0 else SIZES.thin
         canvas.lines(lines, width=width, colour=colour, alpha=0.95, zorder=2.5)
     occupancy.add_lines([line for lines in by_level.values() for line in lines], 0.5)
+    if picture.exceeded_um is not None:
+        above = values - picture.exceeded_um
+        surface, spacing_mm = surfaces.triangulate(faces), HATCH * picture.size_mm
+        triangles = surface.nodes[surface.triangles]
+        (line, _), (hatching, _) = surfaces.above_limit(nodes, above, triangles, spacing_mm)
+        for pieces, width in ((line, SIZES.bold), (hatching, SIZES.hair)):
+            canvas.lines(stage.split(pieces)[0], width=width, colour=theme.accent, zorder=2.8)
     label_isolines(stage, by_level, colour, theme.isoline if diverging else theme.grid)
 
 

@@ -27,7 +27,7 @@ from warpspace.picture.formatting import (
 from warpspace.picture.model import Picture, ScenePicture
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene, common_loop
-from warpspace.units import MM_PER_UM, spell_short
+from warpspace.units import MICROMETRE, MM_PER_UM, spell_short
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,7 +292,11 @@ def _fitting_text(canvas: Canvas, head: str, items: Sequence[str], max_width: fl
 
 
 def map_legend(
-    isolines: str, *, surface: str = "deformed grid", diverging: bool = False
+    isolines: str,
+    limit_um: float | None,
+    *,
+    surface: str = "deformed grid",
+    diverging: bool = False,
 ) -> list[LegendEntry]:
     """Build the legend of a map; an empty `isolines` has no entry."""
     return [
@@ -303,7 +307,15 @@ def map_legend(
             "displacement of corners, |E|",
         ),
         *isoline_entries(isolines, diverging=diverging),
+        *limit_entries(limit_um),
     ]
+
+
+def limit_entries(limit_um: float | None) -> list[LegendEntry]:
+    if limit_um is None:
+        return []
+    text = f"limit {spell_short(limit_um)} {MICROMETRE}, hatched above"
+    return [line_entry(text, lambda theme: theme.accent, SIZES.bold)]
 
 
 def metadata(

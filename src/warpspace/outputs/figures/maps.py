@@ -45,7 +45,7 @@ def draw_error_map(scenes: Sequence[Scene], settings: FigureSettings, *, exact: 
     title = f"{subject}: {picture.scene.title}"
     facts = [*scene_facts(picture, picture.exaggeration), view_words(settings.view, picture.shape)]
     isolines = isoline_words(picture.scale, picture.values)
-    legend = map_legend(isolines, diverging=picture.scale.diverging)
+    legend = map_legend(isolines, picture.exceeded_um, diverging=picture.scale.diverging)
     sheet = start_sheet("error-map", settings, title, facts, scenes, legend, exact=exact)
     drawn = map3d.draw_map(sheet.canvas, picture, sheet.content, settings.view)
     draw_statistics(sheet, picture, drawn.projection.px_per_mm)
@@ -107,7 +107,9 @@ def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     slices = _evaluate_slices(picture, settings.grid)
     title = f"Slices through the working volume: {picture.scene.title}"
     isolines = isoline_words(scale, picture.values)
-    legend = map_legend(isolines, surface="deformed slice", diverging=scale.diverging)
+    legend = map_legend(
+        isolines, picture.exceeded_um, surface="deformed slice", diverging=scale.diverging
+    )
     facts = scene_facts(picture, exaggeration)
     sheet = start_sheet("slices", settings, title, facts, scenes, legend, exact=exact)
     canvas = sheet.canvas
@@ -148,7 +150,8 @@ def _evaluate_slices(picture: ScenePicture, nodes: int) -> list[Slice]:
         slices.append(
             Slice(
                 view=view, grid=grid, field=field, exaggeration=picture.exaggeration,
-                component=picture.component, colours=picture.scale, axis=axis, position_mm=at,
+                component=picture.component, colours=picture.scale, hatch_um=picture.hatch_um,
+                axis=axis, position_mm=at,
             )
         )  # fmt: skip
     return slices

@@ -74,7 +74,9 @@ def _draw_pair(
     isolines = [isoline_words(one.scale, one.values) for one in (first, change)]
     if all(isolines) and isolines[0] != isolines[1]:
         isolines = [f"{isolines[0]}, of {CHANGE} {isolines[1].removeprefix(ISOLINE_STEP)}"]
-    legend = map_legend(next(filter(None, isolines), ""), diverging=scale.diverging)
+    legend = map_legend(
+        next(filter(None, isolines), ""), first.exceeded_um, diverging=scale.diverging
+    )
     sheet = start_sheet(name, settings, title, facts, scenes, legend, exact=exact, panel=False)
     canvas = sheet.canvas
     x_left, bottom, right, top = sheet.content
