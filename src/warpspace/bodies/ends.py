@@ -81,7 +81,7 @@ class Head:
         u, length = self.u, self.layout.length_mm
         if length <= 0.4 * u:
             length = 1.4 * u  # from the tool point to the spindle nose
-        self._add_tool(length)
+        self.add_tool(length)
         top = length + 1.65 * u
         if all(abs(self._line(axis)[0][2]) >= _COAXIAL for axis in axes):
             top = max(top, self.volume_top)
@@ -113,7 +113,7 @@ class Head:
             self._add(mount.carrier, "neck", block([*self.centre, (top + height) / 2.0], half))
         return mount
 
-    def _add_tool(self, length: float) -> None:
+    def add_tool(self, length: float) -> None:
         u, what = self.u, self.tool if self.tool != "cutter" else "tool"
         if self.tool == "probe":
             from trimesh import creation

@@ -9,6 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from warpspace.bodies.arm import Arm, is_arm
 from warpspace.bodies.ends import Head, Mount, WorkpieceSide
 from warpspace.bodies.mesh import LIGHT, MIDDLE, Body
 from warpspace.bodies.schematic import (
@@ -413,6 +414,9 @@ def _generate(
     by_name = {axis.name: axis for axis in axes}
     machine = Machine(parse_chain(chain), by_name, dict(fixed_mm), fixed_deg=dict(fixed_deg))
     parts = Parts(build_layout(machine))
+    if is_arm(parts.layout):
+        _build_arm(parts, tool)
+        return parts.bodies()
     stack = WorkpieceSide(parts)
     stack.build()
     mount = Head(parts, tool).build()
@@ -420,6 +424,17 @@ def _generate(
     (_Behind if lying else _Overhead)(parts, mount, stack).build()
     _add_bed(parts, stack.bed_mm)
     return parts.bodies()
+
+
+def _build_arm(parts: Parts, tool: str) -> None:
+    bed_mm: float | None = None
+    if parts.layout.workpiece:
+        stack = WorkpieceSide(parts)
+        stack.build()
+        bed_mm = stack.bed_mm
+    foot_mm = Arm(parts, tool).build(bed_mm)
+    if parts.floor:
+        _add_bed(parts, foot_mm if bed_mm is None else bed_mm)
 
 
 def _add_bed(parts: Parts, top: float) -> None:

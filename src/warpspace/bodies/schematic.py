@@ -286,11 +286,11 @@ def _nearest(triad: Array, linear: Array) -> Array:
 
 Colour = tuple[int, int, int]
 _BODIES = {
-    LIGHT: "arm bridge column fork headstock portal wedge",
+    LIGHT: "arm bridge column fork headstock link portal wedge",
     MIDDLE: "bed head neck pedestal ram sides towers",
-    DARK: "base beam carriage cradle gripper hub lift nozzle nutator probe rotor saddle swivel tool"
-    " turntable wheel",
-    METAL: "chuck quill rails spindle table",
+    DARK: "base beam carriage cradle gripper hub joint lift nozzle nutator probe rotor saddle"
+    " swivel tool turntable wheel",
+    METAL: "chuck flange quill rails spindle table",
 }
 COLOURS = {body: colour for colour, bodies in _BODIES.items() for body in bodies.split()}
 

@@ -1,13 +1,16 @@
 """Bodies of machines: generated from a description, stored, and placed in the bent machine."""
 
+from itertools import product
 from runpy import run_path
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 from trimesh import Trimesh
 
 import warpspace
 from products import first
+from warpspace.bodies.arm import is_arm
 from warpspace.bodies.frame import generate_bodies
 from warpspace.bodies.mesh import DARK, METAL, Body
 from warpspace.bodies.placed import load_bodies, place_bodies, place_points, scene_motions
@@ -17,7 +20,7 @@ from warpspace.field.evaluate import View, build_basis
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.kinematics.transforms import apply
-from warpspace.machine.definition import build_machine
+from warpspace.machine.definition import build_machine, parse_chain
 from warpspace.resources import assets_dir
 from warpspace.scene.library import load_scene
 from warpspace.scene.machine_library import load_machine, machine_names
@@ -146,6 +149,67 @@ def test_only_slides_that_are_square_and_leave_tables_level_make_a_slant():
     cosine, sine = np.cos(np.radians(30.0)), 0.5
     expected = [[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]]
     np.testing.assert_allclose(slant, expected, atol=1e-12)
+
+
+def arm_machine(chain, **points):
+    rng = np.random.default_rng(5)
+    names = parse_chain(chain).tool
+    offset_mm = {name: tuple(map(float, rng.normal(0.0, 200.0, 3))) for name in names}
+    turns = {name: tuple(map(float, rng.choice([0.0, 90.0, -90.0, 35.0], 3))) for name in names}
+    return build_machine(chain, offset_mm={**offset_mm, **points}, rotation_deg=turns)
+
+
+TIP = {"t": (30.0, 0.0, 150.0)}
+ARMS = {
+    "robot": load_machine("ur10"),
+    "coincident joints": build_machine("wFC1B1C2B2C3t"),
+    "any": arm_machine("wFC1B1C2A1C3t", **TIP),
+    "flange apart": arm_machine("wFA1B1C2A2t", S=(0.0, 50.0, 100.0), **TIP),
+    "tool point at the flange": arm_machine("wFC1B1C2A2B3t", S=(0.0, 0.0, 80.0)),
+    "on a rail": arm_machine("wFXC1B1C2B2t", **TIP),
+    "on a lift": arm_machine("wFZC1B1C2B2C3t", **TIP),
+    "before a table": arm_machine("wCFC1B1C2B2C3t", **TIP),
+}
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_links_of_an_arm_hang_together_and_its_tool_ends_at_the_tool_point(name):
+    machine = ARMS[name]
+    bodies, poses = generate_bodies(machine), build_layout(machine).poses
+    shapes = {
+        frame: [apply_mesh(shape, poses[frame]) for b in bodies if b.frame == frame
+                for shape in components(b)]
+        for frame in ("R", *machine.chain.tool, "S", "t")
+    }  # fmt: skip
+    for (frame, parents), children in zip(shapes.items(), list(shapes.values())[1:], strict=False):
+        pairs = product(parents, children)
+        assert any(have_contact(*pair) for pair in pairs), f"{frame} and the next body are apart"
+    tool = np.concatenate([shape.vertices for shape in shapes["t"]])
+    along = (tool - poses["t"][:3, 3]) @ (poses["S"][:3, 3] - poses["t"][:3, 3])
+    assert along.min() == pytest.approx(0.0, abs=1e-3 * max(np.ptp(along), 1.0))
+    assert {"C1_joint", "C1_link"} <= {b.name for b in bodies} or name != "robot"
+
+
+def apply_mesh(shape, pose):
+    moved = shape.copy()
+    moved.apply_transform(pose)
+    return moved
+
+
+def have_contact(one, other):
+    """Whether two convex shapes have a point in common, within 0.1 mm."""
+    normals = np.concatenate([one.face_normals, other.face_normals])
+    corners = np.concatenate([one.triangles[:, 0], other.triangles[:, 0]])
+    behind = np.einsum("fi,fi->f", normals, corners) + 0.1
+    return linprog(np.zeros(3), A_ub=normals, b_ub=behind, bounds=(None, None)).success
+
+
+def test_an_arm_needs_four_joints_in_series_on_at_most_one_slide():
+    for chain, is_one in (
+        ("wFC1B1C2t", False), ("wFC1B1C2B2t", True), ("wFXYC1B1C2B2t", False),
+        ("wFC1B1XC2B2t", False), ("wC1B1C2B2FZt", False),
+    ):  # fmt: skip
+        assert is_arm(build_layout(build_machine(chain))) is is_one, chain
 
 
 @pytest.fixture(scope="module")
