@@ -192,8 +192,9 @@ def _chosen_colours(state: AppState, volume: LivePicture, basis: ErrorBasis) -> 
     if state.shows_rotary:
         end = look.range_top if look.range_mode == "fixed" else None
         return model.choose_scale([values], component, end=end)
-    if look.pass_fail and quantity == "position" and component == "norm":
-        scale, limit = model.choose_scale([values], component), state.specification.limit_um
+    limit = volume.limit_um
+    if limit is not None:
+        scale = model.choose_scale([values], component)
         top = max(scale.high, limit)
         return PassFail(0.0, top, diverging=True, label=scale.label, unit=scale.unit, limit=limit)
     if look.range_mode == "shared" and quantity != "uncertainty":
