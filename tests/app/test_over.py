@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 import warpspace
-from app.parts import LIVE, lone_part
-from warpspace.app.documents.legend import legend_html, marks, ticks, within_limit_words
+from app.parts import LIVE, Alone, lone_part, section, wait
+from warpspace.app.documents.legend import legend_html, marked, marks, ticks, within_limit_words
 from warpspace.app.drawing.colours import colour_levels
 from warpspace.app.drawing.labels import axes, point_labels
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
-from warpspace.app.panels.design import SAMPLES
+from warpspace.app.panels.analysis_panel import AnalysisPanel
+from warpspace.app.panels.design import SAMPLES, TolerancesPanel
+from warpspace.app.panels.file_dialogs import ReportDialog
 from warpspace.app.panels.overlay import (
     ComparePanel,
     ControlsPanel,
@@ -56,8 +58,8 @@ def test_the_heading_says_what_machines_within_tolerance_reach():
 
 @pytest.mark.parametrize(("limit", "kept"), [(51.0, False), (52.0, True), (1.0, False)])
 def test_the_limit_is_kept_only_where_the_largest_error_keeps_it(limit, kept):
-    words, found = within_limit_words(LIVE.evaluate(limited(limit)))
-    assert found is kept
+    words, kind = within_limit_words(LIVE.evaluate(limited(limit)))
+    assert kind == ("ws-pass" if kept else "ws-fail")
     assert words.startswith("all of") is kept
     assert "100" not in words
 
@@ -110,6 +112,30 @@ def test_a_scene_file_carries_the_limit():
         parse_scene(text, "x")
 
 
+def test_a_scene_without_a_limit_is_not_judged_by_an_assumed_one():
+    state = put(START, "look.pass_fail", "1")
+    picture = LIVE.evaluate(state)
+    assert "limit" not in marked(picture)
+    assert picture.limit_um is None
+    kept = pieces(LegendPanel, state)["head.kept"]
+    assert ">no limit set<" in kept
+    assert "ws-fail" not in kept
+    assert "pass / fail" not in pieces(ControlsPanel, state)["controls"]
+    dialog = ReportDialog(Alone(HeadPanel, state).context)
+    assert "No limit is set." in str(dialog.body(picture))
+    for name in ("allocate", "conformance"):
+        panel = lone_part(TolerancesPanel if name == "allocate" else AnalysisPanel, name)
+        panel.handle(state, "run", "")
+        wait(panel)
+        shown = section(panel, state)
+        assert 'data-set="state:set.specification.limit_um"' in shown
+        assert "Set a limit" in shown or "sets no limit" in shown
+    # a limit that is set, or removed, is that of the scene; another scene has its own
+    assert limited(40).resulting_scene().limit_um == 40.0
+    assert put(limited(40), "specification.limit_um", "").resulting_scene() == FIRST
+    assert limited(40).with_scene(load_scene("dvf5000_second")).specification.limit_um is None
+
+
 def test_axes_are_numbered_in_positions_of_the_machine():
     picture = LIVE.evaluate(START)
     for k, axis in enumerate(axes(picture)):
@@ -132,7 +158,7 @@ def test_the_worst_corner_is_labelled_once():
 
 def test_controls_set_what_is_coloured_and_how_the_machine_is_drawn():
     part = lone_part(ControlsPanel)
-    limit = part.handle(START, "map", "limit")
+    limit = part.handle(limited(40), "map", "limit")
     assert chosen_map(limit) == "limit"
     assert chosen_map(part.handle(limit, "map", "orientation.y")) == "orientation.y"
     for word, drawn in (("off", (False, False)), ("ghost", (False, True)), ("solid", (True, True))):

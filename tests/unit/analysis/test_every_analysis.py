@@ -38,6 +38,7 @@ NEEDED = {
         ["--sweep", "3", "--format", "marlin"],
     ),
     "allocate": ("dvf5000_general", {"limit_um": 60.0}, ["--limit", "60"]),
+    "conformance": ("dvf5000_first", {"limit_um": 40.0}, ["--limit", "40"]),
     "calibrate": ("fork_head_bc", {"data": ("tcp_on.csv",)}, ["--data", "tcp_on.csv"]),
     "clamp": ("dvf5000_first", {"file": PLATE, "place": (0, 0, 50)}, [PLATE, "--place", "0,0,50"]),
     "part": ("dvf5000_first", {"file": PLATE}, [PLATE]),

@@ -121,7 +121,7 @@ ALONE = HEAD + "[errors]\nEC0Y = 20\n[uncertainty]\nEC0Y = 1.5\n"
 QUESTIONS = (
     Line(points=5),
     Form(nodes=3),
-    Conformance(nodes=5),
+    Conformance(nodes=5, limit_um=40.0),
     Part(place=(0, 0, 0)),
     Clamp(grid=2),
 )
@@ -159,7 +159,7 @@ def test_one_error_makes_every_number_as_unsure_as_itself(asked, tmp_path):
 def test_numbers_of_errors_that_nobody_states_are_unknown():
     assert scene_uncertainty(load_scene("dvf5000_first")) is None
     scene = parse_scene(ALONE.replace("EC0Y = 1.5", "EXX = 1"), "s")
-    for asked in (Form(nodes=3), Conformance(nodes=5)):
+    for asked in (Form(nodes=3), Conformance(nodes=5, limit_um=40.0)):
         found = asked.run(scene, lambda _: None)
         assert all(u95 is None for u95, _ in pairs(found.as_json()))
         assert "uncertainty of EC0Y is unknown" in " ".join(found.caveats())

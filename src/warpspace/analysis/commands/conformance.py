@@ -35,9 +35,10 @@ class Conformance(Analysis):
     name = "conformance"
     task = "understand"
     has_table = True
-    limit_um: float = option(
-        40.0, "Largest |E| accepted", unit="µm", low=0.001, high=MAX_ERROR, flag="--limit"
-    )
+    limit_um: float | None = option(
+        None, "Largest |E| accepted", unit="µm", low=0.001, high=MAX_ERROR, flag="--limit",
+        unset="that of the scene",
+    )  # fmt: skip
     loop: Loop | None = option(None, LOOP_HELP, unset=LOOP_UNSET)
     nodes: int = option(21, "Nodes per axis of the working volume", low=2, high=61, flag="--grid")
 
@@ -47,9 +48,12 @@ class Conformance(Analysis):
         field = evaluate_grid(scene, grid, view)
         watch(0.3)
         axes = scene.workspace.volume_axes
+        limit = scene.limit_um if self.limit_um is None else self.limit_um
+        if limit is None:
+            raise OptionError("{limit_um}: the scene sets no limit; set one")
         if not any(axes):
             raise OptionError("{limit_um}: the working volume of the scene is a point")
-        keeps = field.norm_um <= self.limit_um
+        keeps = field.norm_um <= limit
         ranges = scene.workspace.ranges
         lengths = [float(np.ptp(ranges[axis])) if axis else 0.0 for axis in axes]
         box_nodes = largest_box(keeps, lengths)
@@ -68,7 +72,7 @@ class Conformance(Analysis):
         def shares(error_um: Array) -> Array:
             moved = replace(field, error_um=error_um)
             keeps = (share_within(moved, part) for part in SHARES)
-            return np.array([100.0 * share_below(moved, self.limit_um), *keeps])
+            return np.array([100.0 * share_below(moved, limit), *keeps])
 
         percent, *keeps_um = shares(field.error_um).tolist()
         u95, *u95_um = uncertainty.propagate(shares) if uncertainty else [None] * (1 + len(SHARES))
@@ -78,7 +82,7 @@ class Conformance(Analysis):
             expanded["u95_percent"] = u95
             expanded["u95_keeps_um"] = dict(zip(names, u95_um, strict=True))
         return ConformanceResult(
-            limit_um=self.limit_um,
+            limit_um=limit,
             percent=percent,
             box=box,
             keeps_um=dict(zip(names, keeps_um, strict=True)),

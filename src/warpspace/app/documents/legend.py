@@ -89,8 +89,9 @@ def marked(picture: LivePicture) -> dict[str, float]:
     norm = field.norm_um
     marks = {"mean": volume_mean(norm, picture.grid), "P95": share_within(field, P95),
              "max": float(norm.max())}  # fmt: skip
-    if not picture.tilts and not picture.is_difference:
-        marks["limit"] = picture.state.specification.limit_um
+    limit = picture.state.specification.limit_um
+    if limit is not None and not picture.tilts and not picture.is_difference:
+        marks["limit"] = limit
     return marks
 
 
@@ -224,16 +225,19 @@ def place_words(picture: LivePicture) -> str:
     return f"at {formatting.list_axes(axes)}" if axes else ""
 
 
-def within_limit_words(picture: LivePicture) -> tuple[str, bool]:
-    """Format the share of the volume within the limit; also return whether it is complete.
+def within_limit_words(picture: LivePicture) -> tuple[str, str]:
+    """Format the share of the volume within the limit; also return the class of the text.
 
     An incomplete share is never rounded to all (`share_below`).
     """
     limit = picture.state.specification.limit_um
+    if limit is None:
+        return "no limit set", ""
     percent = 100.0 * share_below(picture.field, limit)
     is_within = float(picture.field.norm_um.max()) <= limit
     share = number(min(percent, 99.9), 0 if percent < 99.0 else 1)
-    return f"{'all' if is_within else f'{share} %'} of the volume within {limit:g} µm", is_within
+    words = f"{'all' if is_within else f'{share} %'} of the volume within {limit:g} µm"
+    return words, "ws-pass" if is_within else "ws-fail"
 
 
 def subject_words(picture: LivePicture) -> list[str]:

@@ -74,7 +74,7 @@ class LiveModel:
             if state.look.pass_fail:
                 common["limit_um"] = state.specification.limit_um
             else:
-                common["hatch_um"] = state.limit_um
+                common["hatch_um"] = state.specification.limit_um
         traced = tuple(
             TraceLines(group, own.nominal_mm, error, factor)
             for (group, own), error in zip(traces, errors, strict=True)
@@ -195,8 +195,9 @@ def _chosen_colours(state: AppState, volume: LivePicture, basis: ErrorBasis) -> 
     if state.shows_rotary:
         end = look.range_top if look.range_mode == "fixed" else None
         return model.choose_scale([values], component, end=end)
-    if look.pass_fail and quantity == "position" and component == "norm":
-        scale, limit = model.choose_scale([values], component), state.specification.limit_um
+    limit = volume.limit_um
+    if limit is not None:
+        scale = model.choose_scale([values], component)
         top = max(scale.high, limit)
         return PassFail(0.0, top, diverging=True, label=scale.label, unit=scale.unit, limit=limit)
     if look.range_mode == "shared" and quantity != "uncertainty":

@@ -28,7 +28,16 @@ from warpspace.app.evaluation.cache import exclusive_work
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import block_html, result_html
 from warpspace.app.panels.file_dialogs import PLAIN
-from warpspace.app.panels.panel import Context, Job, Jobs, Section, actions, alert, details
+from warpspace.app.panels.panel import (
+    Context,
+    Job,
+    Jobs,
+    Section,
+    actions,
+    alert,
+    details,
+    setting,
+)
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import LONGEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
@@ -46,7 +55,7 @@ TITLES = {
     "adjust": "Adjustment", "allocate": "Tolerances", "concepts": "Machines side by side",
 }  # fmt: skip
 """Titles of sections that differ from the name of the command."""
-OF_STATE = frozenset({"loop", "placed"})  # options that are set once, for the whole page
+OF_STATE = frozenset({"loop", "placed", "limit_um"})  # options set once, for the whole page
 QUICK_S = 1.0  # an analysis that takes less is repeated after each change
 MOST_STEPS = 4  # errors listed on a card
 SAME = 1e-3  # µm or µrad; smaller changes of an error are not listed
@@ -102,7 +111,8 @@ class AnalysisPanel(Section):
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
         """Return values of options that follow the state unless they are set."""
-        state_values = {"loop": str(state.loop), "limit_um": f"{state.specification.limit_um:g}"}
+        limit = state.specification.limit_um
+        state_values = {"loop": str(state.loop), "limit_um": "" if limit is None else f"{limit!r}"}
         state_values["placed"] = str(int(state.view_key[1]))
         if state.picked is not None:
             state_values["at"] = spell_at(state.picked.at)
@@ -218,7 +228,9 @@ class AnalysisPanel(Section):
 
     def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
         options = [option for option in self.shown_options(state) if option.name not in OF_STATE]
-        if not options:
+        if "limit_um" in {option.name for option in self.shown_options(state)}:
+            controls = setting(state, "specification.limit_um") + controls
+        if not options and not controls:
             return EMPTY
         values = self.values(state)
         form = controls + join(

@@ -23,7 +23,7 @@ from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.machine_edits import library
 from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import histogram_html
-from warpspace.app.panels.panel import alert, setting, tiny
+from warpspace.app.panels.panel import alert, quiet, setting, tiny
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.leaf import Identity
@@ -71,11 +71,7 @@ class TolerancesPanel(AnalysisPanel):
         return (*_sampled(state), state.tolerances, state.specification, values)
 
     def is_ready(self, state: AppState) -> bool:
-        try:
-            sample_machines(state)
-        except WarpspaceError:
-            return False
-        return True
+        return state.specification.limit_um is not None and _can_sample(state)
 
     def is_automatic(self, state: AppState) -> bool:
         return False  # it would change tolerances by itself
@@ -119,7 +115,7 @@ class TolerancesPanel(AnalysisPanel):
 
     def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
         controls = _controls(state, "over", "distribution", "costs")
-        listed = self._rows(sample_machines(state), state) if self.is_ready(state) else EMPTY
+        listed = self._rows(sample_machines(state), state) if _can_sample(state) else EMPTY
         return listed + super().options_html(state, controls)
 
     def _probability(self, ensemble: Ensemble, state: AppState) -> Markup:
@@ -130,18 +126,21 @@ class TolerancesPanel(AnalysisPanel):
             "|E| of the machines", "", "|E| [µm]", "machines", histogram.edges_um,
             histogram.counts.astype(float), limit=specification.limit_um,
         )  # fmt: skip
-        headline = fill(
-            '<p class="ws-headline"><span class="{kind}">{share} %</span> of the machines stay'
-            " within {limit} µm {where}</p>",
-            kind="ws-pass" if probability.low >= specification.percent / 100.0 else "ws-fail",
-            share=percent(probability.probability), limit=f"{specification.limit_um:g}",
-            where=WHERE[specification.over],
-        )  # fmt: skip
+        headline = quiet("Set a limit for the share of the machines that meet it.")
         numbers = (
             f"mean {number(stream.mean_um)} · P95 {number(stream.quantile(0.95))} ·"
-            f" largest {number(stream.max_um)} µm; {spell_count(stream.count)} machines,"
-            f" 95 % confidence {percent(probability.low)} … {percent(probability.high)} %"
+            f" largest {number(stream.max_um)} µm; {spell_count(stream.count)} machines"
         )
+        if probability is not None:
+            headline = fill(
+                '<p class="ws-headline"><span class="{kind}">{share} %</span> of the machines stay'
+                " within {limit} µm {where}</p>",
+                kind="ws-pass" if probability.low >= specification.percent / 100.0 else "ws-fail",
+                share=percent(probability.probability), limit=f"{specification.limit_um:g}",
+                where=WHERE[specification.over],
+            )  # fmt: skip
+            low, high = percent(probability.low), percent(probability.high)
+            numbers += f", 95 % confidence {low} … {high} %"
         return headline + histogram_html(chart) + tiny(numbers)
 
     def _rows(self, ensemble: Ensemble, state: AppState) -> Markup:
@@ -212,12 +211,19 @@ def sample_machines(state: AppState) -> Ensemble:
     return ENSEMBLES.get(_sampled(state), build, lambda ensemble: ensemble.size)
 
 
+def _can_sample(state: AppState) -> bool:
+    try:
+        sample_machines(state)
+    except WarpspaceError:
+        return False
+    return True
+
+
 def allowed_words(state: AppState) -> Markup:
     """Format the largest |E| of sampled machines within tolerance, and that of all of them."""
-    try:
-        ensemble = sample_machines(state)
-    except WarpspaceError:
+    if not _can_sample(state):
         return EMPTY
+    ensemble = sample_machines(state)
     ranges = _centres_and_widths(ensemble, state.tolerances)
     largest = float(ensemble.norm_um(*ranges).max())
     if not largest:
@@ -239,15 +245,13 @@ def _centres_and_widths(ensemble: Ensemble, tolerances: ToleranceSet) -> Array:
 
 
 def estimate(
-    ensemble: Ensemble, tolerances: ToleranceSet, limit_um: float
-) -> tuple[Stream, Probability]:
-    """Evaluate the machines of a tolerance set, and the probability of meeting the limit."""
+    ensemble: Ensemble, tolerances: ToleranceSet, limit_um: float | None
+) -> tuple[Stream, Probability | None]:
+    """Evaluate the machines of a tolerance set, and the probability of meeting a limit."""
     norm_um = ensemble.norm_um(*_centres_and_widths(ensemble, tolerances))
     stream = Stream(len(norm_um), limit_um)
     stream.add(norm_um)
-    probability = stream.probability()
-    assert probability is not None  # noqa: S101 - a limit was given
-    return stream, probability
+    return stream, stream.probability()
 
 
 def tolerance_shares(ensemble: Ensemble, tolerances: ToleranceSet) -> dict[str, float]:
@@ -284,7 +288,7 @@ class ConceptsPanel(AnalysisPanel):
         return [key for key in text.split("\n") if key][:MOST_CONCEPTS]
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
-        return {"limit_um": f"{state.specification.limit_um:g}", "samples": str(SAMPLES)}
+        return {"limit_um": super().defaults(state)["limit_um"], "samples": str(SAMPLES)}
 
     def scenes(self, state: AppState) -> Sequence[Scene]:
         offers = self.offers(state)

@@ -137,7 +137,7 @@ def _contributions(explanation: PointExplanation) -> Markup:
     return rows(lines, "ws-rows ws-causes") + note
 
 
-def _uncertainty(explanation: PointExplanation, limit_um: float) -> Markup:
+def _uncertainty(explanation: PointExplanation, limit_um: float | None) -> Markup:
     """Render the probability of meeting the limit and the variance shares of |E|, largest first.
 
     Negative correlations give negative shares; all shares add up to 100 %.
@@ -150,11 +150,10 @@ def _uncertainty(explanation: PointExplanation, limit_um: float) -> Markup:
     shares = [(key, f"{number(100.0 * share, 0)} %") for key, share in variances.items()]
     shares = [(key, share) for key, share in shares if share != "0 %"]
     largest = ", ".join(f"{key} {share}" for key, share in shares[:FIRST])
-    probability = number(100.0 * float(uncertainty.conformance_probability(limit_um)), 1)
-    text = (
-        f"|E| ≤ {limit_um:g} µm with a probability of {probability} %."
-        f" U95{length_words(uncertainty)} µm; variance shares: {largest}"
-    )
+    text = f"U95{length_words(uncertainty)} µm; variance shares: {largest}"
+    if limit_um is not None:
+        probability = number(100.0 * float(uncertainty.conformance_probability(limit_um)), 1)
+        text = f"|E| ≤ {limit_um:g} µm with a probability of {probability} %. {text}"
     if len(shares) <= FIRST:
         return tiny(text)
     table = rows(shares[FIRST:])

@@ -268,7 +268,8 @@ class ReportDialog(JobDialog):
         if compared is not None and transfers.has_sheet(picture):
             a, b = compared.titles
             subject = f"Comparison of A, {a}, with B, {b}."
-        limit = f"{picture.state.specification.limit_um:g} µm"
+        limit_um = picture.state.specification.limit_um
+        limit = "No limit is set" if limit_um is None else f"Limit: {limit_um:g} µm"
         added = [
             tag("li", join((f"{title} ", button("Remove", "report:remove", index, kind="link"))))
             for index, (title, _) in enumerate(self.context.report_results)
@@ -276,7 +277,7 @@ class ReportDialog(JobDialog):
         # the list of notes may hold a box for the same name
         author = text_box("state:set.page.author", picture.state.page.author, id="ws-report-author")
         return join((
-            tag("p", f"{subject} Limit: {limit}."),
+            tag("p", f"{subject} {limit}."),
             field("Author", author, "report.author"),
             setting(picture.state, "page.questions"),
             actions(button("Write HTML", "report:write", ".html", kind="main",

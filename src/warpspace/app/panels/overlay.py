@@ -79,12 +79,11 @@ class LegendPanel(Panel):
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         limit_menu = EMPTY
         if not picture.is_difference and not picture.is_rotary:
-            share, is_pass = legend.within_limit_words(picture)
-            name, limit = "specification.limit_um", f"{picture.state.specification.limit_um:g}"
+            share, kind = legend.within_limit_words(picture)
+            name, limit = "specification.limit_um", spell_limit(picture.state)
             box = text_box(f"state:set.{name}", limit, size="short", label="Limit", id="ws-limit")
             body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
-            limit_menu = menu(share, body, key="limit", hint="Change the limit",
-                        kind="ws-pass" if is_pass else "ws-fail")  # fmt: skip
+            limit_menu = menu(share, body, key="limit", hint="Change the limit", kind=kind)
         return {"head.kept": limit_menu, "legend": legend.legend_html(picture)}
 
 
@@ -257,7 +256,16 @@ def _leaf_picks(state: AppState, path: str) -> Markup:
 def chosen_map(state: AppState) -> str:
     """Return the quantity that colours the map, as a value of the event ``controls:map``."""
     chosen = f"{state.look.quantity}.{state.component}"
-    return "limit" if state.look.pass_fail and chosen == "position.norm" else chosen
+    is_set = state.specification.limit_um is not None
+    return "limit" if is_set and state.look.pass_fail and chosen == "position.norm" else chosen
+
+
+def spell_limit(state: AppState) -> str:
+    limit = state.specification.limit_um
+    return "" if limit is None else f"{limit:g}"
+
+
+NO_LIMIT = "Pass or fail: set a limit in the heading."
 
 
 class ControlsPanel(Panel):
@@ -337,7 +345,7 @@ def _exaggeration(picture: LivePicture) -> Markup:
 def _colours(picture: LivePicture) -> Markup:
     state, look, chosen = picture.state, picture.state.look, chosen_map(picture.state)
     uncertainty = picture.uncertainty
-    limit = f"pass / fail at {state.specification.limit_um:g} µm"
+    limit = f"pass / fail at {spell_limit(state)} µm"
     body: list[Markup] = []
     label: object = limit
     for quantity, title in QUANTITIES.items():
@@ -350,7 +358,8 @@ def _colours(picture: LivePicture) -> Markup:
         body += [tag("h3", title), _picks("controls:map", names, chosen, f"{quantity}.")]
         if quantity == picture.quantity and chosen != "limit":
             label = names[state.component]
-    body.insert(2, _picks("controls:map", {"limit": limit}, chosen))
+    is_set = state.specification.limit_um is not None
+    body.insert(2, _picks("controls:map", {"limit": limit}, chosen) if is_set else tiny(NO_LIMIT))
     top = look.range_top if look.range_mode == "fixed" else picture.scale.high
     body += [tag("h3", "Colour range"), _leaf_picks(state, "look.range_mode"),
              setting(state, "look.range_top", text=f"{top:.4g}")]  # fmt: skip

@@ -318,8 +318,9 @@ def setting(state: AppState, path: str, *, text: str = "", bar: bool = False) ->
         control = tag("textarea", str(present), class_="ws-box", id=html.ident(name), rows=3,
                       data_set=name, maxlength=LONGEST, placeholder=leaf.hint or None)  # fmt: skip
     elif leaf.kind == "number":
-        text = text or f"{present:.6g}"
-        control = text_box(name, text, size="short", inputmode="decimal")
+        text = text or ("" if present is None else f"{present:.6g}")
+        control = text_box(name, text, size="short", inputmode="decimal",
+                           placeholder=leaf.choices.get(""))  # fmt: skip
         if bar and leaf.span is not None:
             span, label = leaf.span, path.rpartition(".")[2]
             control = html.slider(name, present, span.low, span.high, span.step, label=leaf.label,

@@ -24,6 +24,7 @@ from warpspace.app.state.look import (
 )
 from warpspace.exceptions import WarpspaceError
 from warpspace.field.evaluate import View
+from warpspace.field.grid import DEFAULT_NODES
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear, parameter
 from warpspace.machine.definition import Vector
@@ -44,7 +45,7 @@ EXAGGERATION = Span(*FACTORS, 1.0)
 PLACE = Span(-MAX_LENGTH_MM, MAX_LENGTH_MM, 1.0)  # mm and degrees
 LIMIT_UM = Span(1.0, 300.0, 0.5)
 PERCENT = Span(100.0 * PROBABILITY[0], 100.0 * PROBABILITY[1], 0.1)
-START_NODES, START_UM = 21, 50.0
+START_NODES = DEFAULT_NODES
 COMPONENT_NAMES = {
     "position": {"norm": "|E| length", "x": "E_x", "y": "E_y", "z": "E_z"},
     "orientation": {
@@ -102,7 +103,9 @@ class Exclusions:
 
 @dataclass(frozen=True, slots=True)
 class Specification:
-    limit_um: float = described(START_UM, "|E| allowed", span=LIMIT_UM, unit="µm")
+    limit_um: float | None = described(  # None where no limit is set
+        None, "|E| allowed", choices={"": "not set"}, kind="number", span=LIMIT_UM, unit="µm"
+    )
     # at one random point of each machine (as in the thesis), or at its worst point (the default)
     over: str = described(
         "max",
@@ -332,12 +335,6 @@ class AppState:
         return self.look.drawing == "rotary" and not all(map(is_linear, self.scene.machine.axes))
 
     @property
-    def limit_um(self) -> float | None:
-        """The limit of |E| of the scene or the user; None if none is set."""
-        limit = self.specification.limit_um
-        return None if self.scene.limit_um is None and limit == START_UM else limit
-
-    @property
     def origin(self) -> Scene:
         """The scene as opened, which reset returns to."""
         return self.loaded or self.scene
@@ -393,7 +390,7 @@ class AppState:
             exaggeration=self.exaggeration,
             placed=self.placed,
             review=self.review,
-            limit_um=self.limit_um,
+            limit_um=self.specification.limit_um,
         )
 
     def active_scene(self) -> Scene:
@@ -428,7 +425,6 @@ class AppState:
         forms = {k: v for k, v in self.forms.items() if not k.startswith(of_part)}
         changed = replace(
             fresh,
-            specification=self.specification if scene.limit_um is None else fresh.specification,
             forms={**forms, **fresh.forms},
             **unchanged,
         )
@@ -460,7 +456,7 @@ class AppState:
     def at_rest(self) -> "AppState":
         """Return the reference for the view of a note: without settings stored in the scene."""
         at_zero = dict.fromkeys(self.positions, 0.0)
-        limit = replace(self.specification, limit_um=START_UM)
+        limit = replace(self.specification, limit_um=None)
         return replace(self.zeroed(), positions=at_zero, exaggeration=None, loop=Loop.TOOL,
                        placed=False, specification=limit)  # fmt: skip
 
@@ -481,7 +477,7 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
         scene.exaggeration,
         loop=scene.default_loop,
         placed=scene.placed,
-        specification=Specification(START_UM if scene.limit_um is None else scene.limit_um),
+        specification=Specification(scene.limit_um),
         tolerances=scene.tolerances,
         review=scene.review,
         part=part,
