@@ -66,6 +66,14 @@ def test_a_slider_has_the_range_of_its_kind_again_after_a_wild_number():
     assert 'max="100"' in again["error.EAX"]
 
 
+def test_undo_restores_the_range_that_a_large_number_widened():
+    column = Column()
+    before = column.do("none")["error.EAY"]
+    assert 'max="500"' in column.do("set.EAY", "200")["error.EAY"]
+    column.state = STATE
+    assert column.do("none")["error.EAY"] == before
+
+
 def test_a_row_opens_into_curve_origin_and_numbers_and_goes_back():
     column = Column()
     opened = column.do("row", "EAY")["error.EAY"]

@@ -17,12 +17,12 @@ from warpspace.analysis.registry import register, unregister
 from warpspace.app.documents.output_services import CancelledError, Services
 from warpspace.app.evaluation import cache
 from warpspace.app.panels.error_list import used_keys
-from warpspace.app.panels.panel import Context, Jobs, Panel
+from warpspace.app.panels.panel import MOST_FILES, Context, Jobs, Panel
 from warpspace.app.server import session
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
-from warpspace.exceptions import WarpspaceError
+from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.scene.library import load_scene
 
 FIRST = load_scene("dvf5000_first")
@@ -143,8 +143,9 @@ def watched(monkeypatch):
     return found, bars, failures
 
 
-def test_one_job_at_a_time_says_how_far_it_is_and_hands_over_what_it_raises(watched):
+def test_one_job_after_the_other_says_how_far_it_is_and_hands_over_what_it_raises(watched):
     (found, bars, failures), go = watched, threading.Event()
+    done = []
 
     def work(job):
         for share in (0.25, 0.5):
@@ -152,13 +153,17 @@ def test_one_job_at_a_time_says_how_far_it_is_and_hands_over_what_it_raises(watc
         go.wait(10)
         raise WarpspaceError("broken")
 
-    assert found.start("one", work)
-    assert not found.start("two", work)
+    found.start("one", work)
+    for number in range(MOST_FILES):
+        found.start(f"n{number}", lambda _, number=number: done.append(number))
+    with pytest.raises(OptionError, match=f"more: {MOST_FILES} jobs are waiting"):
+        found.start("more", work)
     go.set()
     while not failures or bars[-1]:
         time.sleep(0.01)
+    assert done == [*range(MOST_FILES)]
     said = [text[1] for bar in bars if (text := re.search("<span>(.*?)</span>", bar))]
-    assert {"one: 25 %", "one: 50 %"} <= set(said)
+    assert any(re.match("one.* Then: n0, n1, ", text) for text in said)
     assert not found.busy
     assert [str(error) for error in failures] == ["broken"]
 

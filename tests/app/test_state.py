@@ -82,8 +82,8 @@ def test_a_leaf_takes_what_people_type_and_says_what_it_does_not(path, text, kep
     assert spell(state, path) == kept
     assert note in "; ".join(state.notes)
     assert bool(note) is bool(state.notes)
-    is_step = spell(FIRST, path) != kept and not path.startswith("page")
-    assert bool(changes(FIRST, state.without_notes())) is is_step
+    is_change = spell(FIRST, path) != kept and not path.startswith("page")
+    assert bool(changes(FIRST, state.without_notes())) is is_change
 
 
 def test_what_follows_a_leaf_follows_it_and_members_come_and_go():
@@ -109,9 +109,7 @@ def test_what_follows_a_leaf_follows_it_and_members_come_and_go():
         (put(FIRST, "positions.B", "1"), "position of B"),
         (put(FIRST, "exclusions.only", "+EAX"), "only roll of X"),
         (put(FIRST, "tolerances.EAX", "1"), "tolerance of roll of X"),
-        (put(FIRST, "look.surface", "cut"), "surface"),
-        (put(FIRST, "rotary.held.B", "1"), "B held at"),
-        (put(FIRST, "picked", "X 1"), "point"),
+        (put(FIRST, "loop", "tool"), "structural loop"),
         (edits.with_curve(FIRST, "EAX", Constant((-275.0, 275.0), 3.0)), "roll of X"),
         (FIRST.with_scene(load_scene("teach_tilted_c")), "scene"),
         (with_word(FIRST, "travel X 0 -200"), "machine"),
@@ -122,6 +120,45 @@ def test_what_follows_a_leaf_follows_it_and_members_come_and_go():
 def test_undo_says_what_it_takes_back(state, words, store):
     store.apply(lambda _: state)
     assert store.undo() == words
+
+
+@pytest.mark.parametrize(
+    ("path", "text"),
+    [("look.surface", "cut"), ("rotary.held.B", "1"), ("picked", "X 1"), ("component", "z"),
+     ("shown.dark", "1"), ("exaggeration", "50"), ("machine.shown", "1"), ("page.task", "improve"),
+     ("nodes", "9"), ("lever", "EAX"), ("comparison.shown", "b")],
+)  # fmt: skip
+def test_a_change_of_the_view_is_no_step_and_stays(path, text, store):
+    store.apply(moved("EAX", 1.0))
+    store.undo()
+    store.apply(lambda state: put(state, path, text))
+    assert spell(store.state, path) != spell(FIRST, path)
+    assert store.undo() == ""
+    assert store.redo() == store.undo() == "roll of X"
+    assert store.state == put(FIRST, path, text)
+    # nor is a step that changed the same setting prevented from being undone
+    store.apply(lambda state: put(moved("EAX", 2.0)(state), path, spell(FIRST, path)))
+    store.apply(lambda state: put(state, path, text))
+    assert store.undo() == "roll of X"
+    assert store.state == put(FIRST, path, text)
+
+
+def test_undo_of_another_scene_restores_its_view(store):
+    at = put(FIRST, "picked", "X 1").picked
+    store.apply(lambda state: replace(state, picked=at))
+    store.apply(lambda state: state.with_scene(load_scene("ur10")))
+    store.apply(lambda state: put(state, "picked", "J1 1"))
+    store.apply(lambda state: put(state, "shown.dark", "1"))
+    assert store.undo() == "scene"
+    assert store.state.picked == at
+    assert store.state.shown.dark
+
+
+def test_another_side_of_a_comparison_is_drawn_and_the_comparison_undone(store):
+    store.apply(with_pin)
+    store.apply(lambda state: put(state, "comparison.ghost", "0"))
+    assert store.undo() == "comparison"
+    assert store.state.comparison.pinned is None
 
 
 def test_a_machine_that_moves_its_workpiece_opens_in_the_relative_loop():
@@ -291,15 +328,15 @@ def test_undo_takes_back_the_last_change_of_its_own_tab(tabs):
     mine, yours = tabs
     mine.apply(moved("EAX", 1.0))
     yours.apply(moved("EBX", 2.0))
-    yours.apply(lambda state: put(state, "component", "z"))
-    assert (mine.undoes, yours.undoes) == ("roll of X", "component")
+    yours.apply(lambda state: put(state, "loop", "tool"))
+    assert (mine.undoes, yours.undoes) == ("roll of X", "structural loop")
     assert mine.undo() == "roll of X"
     assert (mine.undoes, mine.redoes) == ("", "roll of X")
     assert yours.state.amplitudes == {**FIRST.amplitudes, "EBX": 2.0}
     assert [*yours.state.amplitudes] == [*FIRST.amplitudes]
-    assert yours.state.component == "z"
+    assert yours.state.loop is Loop.TOOL
     mine.redo()
-    assert yours.undo() == "component"
+    assert yours.undo() == "structural loop"
     assert yours.state == FIRST.with_amplitude("EAX", 1.0).with_amplitude("EBX", 2.0)
 
 

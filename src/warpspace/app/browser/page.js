@@ -161,7 +161,10 @@
   for (const [type, pressed] of [["pointerdown", true], ["pointerup", false], ["pointercancel", false]])
     addEventListener(type, event => {
       for (const node of pressed ? [event.target] : shell.querySelectorAll("[data-held]"))
-        if (node.type === "range") { if (pressed) node.dataset.held = "1"; else delete node.dataset.held; }
+        if (node.type === "range") {
+          if (pressed) node.dataset.held = "1"; else delete node.dataset.held;
+          send("page:hold", pressed ? "1" : "");  // all its changes are one step of undo
+        }
     }, true);
   shell.addEventListener("focusout", event => { delete event.target.dataset?.held; });
 

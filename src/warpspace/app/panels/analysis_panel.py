@@ -280,6 +280,8 @@ class AnalysisPanel(Section):
 
     def _run(self, state: AppState) -> None:
         key, scenes = self.result_key(state), self.scenes(state)
+        if self._jobs.busy and key == self.last_key:
+            return  # a double click
         self.last_key, self._title_prefix = key, f"{state.scene.title} · "
         try:
             analysis = self.build_analysis(state, self.values(state), scenes[0])

@@ -299,6 +299,8 @@ class ErrorsPanel(Panel):
         super().__init__(context)
         self._feedback: Mapping[str, CurveEditFeedback | None] = {}
         self._edited: set[str] = set()  # errors changed in this list since the last ranking
+        self._is_edit = False  # since the last rendering
+        self._shown: Mapping[str, float] = {}  # amplitudes of the last rendering
         self._ranking: Ranking | None = None
         self._gains, self._list = Memo[Mapping[str, float]](), Memo[str]()
         self._rows = Memo[dict[str, tuple[float, str]]]()  # HTML of a value, by key
@@ -318,7 +320,9 @@ class ErrorsPanel(Panel):
         ranking, positions = self._ranking, tuple(state.positions.items())
         view = state.view_key, state.shows_rotary
         inputs = (Identity(state.origin), tuple(state.amplitudes), *view, positions)
-        if ranking is not None and ranking.inputs == inputs:
+        is_own, self._is_edit = self._is_edit or state.amplitudes == self._shown, False
+        self._shown = state.amplitudes
+        if is_own and ranking is not None and ranking.inputs == inputs:  # not after an undo
             before = ranking.amplitudes
             changed = {key for key, value in state.amplitudes.items() if value != before.get(key)}
             if changed <= self._edited and (self._edited or ranking.gains is gains):
@@ -359,6 +363,7 @@ class ErrorsPanel(Panel):
         command, _, key = action.partition(".")
         if command in ("set", "kind", "rows", "own") and key in state.amplitudes:
             self._edited.add(key)
+            self._is_edit = True
             if command == "set":
                 return put(state, f"amplitudes.{key}", value)
             state, feedback = edit_curve(state, command, key, value)

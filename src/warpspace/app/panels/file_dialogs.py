@@ -41,7 +41,7 @@ def accepted_endings() -> str:
 
 
 class JobDialog(Dialog):
-    """A dialog that writes files, one at a time, with progress and cancellation."""
+    """A dialog that writes files, one after the other, with progress and cancellation."""
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -59,9 +59,7 @@ class JobDialog(Dialog):
             if not job.is_set():
                 self.context.save_file(f"{transfers.file_stem(picture)}{ending}", content)
 
-        if not self._jobs.start(name, work):
-            text = "Another file is being written: wait for it, or cancel it"
-            self.context.notify("Busy", text, "warning")
+        self._jobs.start(name, work)
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action == "cancel":
@@ -135,7 +133,7 @@ class FilesDialog(JobDialog):
             if name.endswith(endings):
                 self.context.send(f"{panel}:file", value)
                 return
-        self._uploads.start("Opening", partial(self._parse, value), waits=True)
+        self._uploads.start("Opening", partial(self._parse, value))
 
     def _parse(self, value: str, job: Job) -> None:
         name, content = transfers.read_upload(value)

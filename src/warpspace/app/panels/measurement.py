@@ -95,7 +95,7 @@ class FilesPanel(AnalysisPanel):
             if not job.is_set():
                 self.context.call_soon(partial(self._accept, accept))
 
-        self._uploads.start("Reading", work, waits=True)
+        self._uploads.start("Reading", work)
 
     def _accept(self, accept: Callable[[], None]) -> None:
         self._upload_problem = ""

@@ -35,9 +35,9 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.store import StateStore, Update
 from warpspace.app.state.tree import LONGEST, leaves, spell, value
-from warpspace.exceptions import WarpspaceError
+from warpspace.exceptions import OptionError, WarpspaceError
 
-MOST_FILES = 16  # that may wait for the session
+MOST_FILES = 16  # that may wait for the session; likewise jobs
 PAUSE_S = 0.1  # without changes: longer than between two moves of a drag
 
 
@@ -69,6 +69,7 @@ class Context:
         self.last_decision: tuple[AppState, str] | None = None
         self.offer_import: Callable[[str, bytes], None] = lambda _name, _content: None
         self.changed_at = time.monotonic()
+        self.held_since: float | None = None  # while a slider is held: its changes are one step
         self.page_look = store.state.page  # of this tab, also where the state is shared
         # state of the present step of a story; replaces the state on the page without changing it
         self.story_state: AppState | None = None
@@ -99,7 +100,8 @@ class Context:
             self.page_look = updated.page
             return updated
 
-        self.notes += self.store.apply(update_tab, by=self.mark_changed, at=self.changed_at)
+        at = self.changed_at if self.held_since is None else self.held_since
+        self.notes += self.store.apply(update_tab, by=self.mark_changed, at=at)
 
     def wake(self) -> None:
         self._wake.set()
@@ -353,7 +355,7 @@ class Job(threading.Event):
 
 
 class Jobs:
-    """The jobs of a panel, one at a time; callbacks run in the session."""
+    """The jobs of a panel, one after the other; callbacks run in the session."""
 
     def __init__(
         self, panel: Panel, on_progress: Callable[[], None], on_failure: Callable[[Exception], None]
@@ -367,17 +369,19 @@ class Jobs:
     def busy(self) -> bool:
         return self._job is not None
 
-    def start(self, name: str, work: Callable[[Job], None], *, waits: bool = False) -> bool:
-        """Start a job, now or after a running one; return False if it cannot. For the session."""
+    def start(self, name: str, work: Callable[[Job], None]) -> None:
+        """Start a job, now or after those before it. For the session."""
         if self._job is not None:
-            self._waiting += [(name, work)] if waits else []
-            return waits
+            if len(self._waiting) == MOST_FILES:
+                raise OptionError(f"{name}: {MOST_FILES} jobs are waiting; try again later")
+            self._waiting.append((name, work))
+            self._on_progress()
+            return
         self._job = job = Job(name, self._on_progress)
         self._panel.context.jobs.add(job)
         run = partial(self._run, job, work)
         threading.Thread(target=run, name="warpspace-work", daemon=True).start()
         self._on_progress()
-        return True
 
     def cancel(self) -> None:
         if self._job is not None:
@@ -390,9 +394,11 @@ class Jobs:
             return EMPTY
         share = html.number(100.0 * job.share, 0) if job.share else None
         bar = tag("progress", "", max=100, value=share, aria_label=job.name)
-        label = tag("span", f"{job.name}: {share} %" if share else f"{job.name} …")
+        label = f"{job.name}: {share} %" if share else f"{job.name} …"
+        if self._waiting:
+            label += f" Then: {', '.join(name for name, _ in self._waiting)}"
         cancel = button("Cancel", f"{self._panel.name}:cancel")
-        return tag("div", join((bar, label, cancel)), class_="ws-actions ws-run")
+        return tag("div", join((bar, tag("span", label), cancel)), class_="ws-actions ws-run")
 
     def _run(self, job: Job, work: Callable[[Job], None]) -> None:
         error = None

@@ -228,6 +228,10 @@ class Comparison:
     ghost: bool = described(True, "Other side as a wireframe", linked="compare.ghost")
     pinned: Side | None = None  # pinned last: the state before, or a proposal
 
+    @property
+    def sides(self) -> tuple[Side | None, ...]:
+        return self.a, self.b, self.pinned
+
     def off(self) -> "Comparison":
         return Comparison(pinned=self.pinned, ghost=self.ghost)
 

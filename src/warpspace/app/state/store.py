@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from warpspace.app.state.app_state import AppState, Comparison
+from warpspace.app.state.app_state import KEPT_FIELDS, AppState, Comparison
 from warpspace.app.state.leaf import default_of, description, lowered, name_of
 from warpspace.app.state.look import PageLook
 from warpspace.app.state.tree import leaves, stored
@@ -25,6 +25,9 @@ from warpspace.exceptions import OptionError
 # --- Differences of two states --------------------------------------------------------------------
 
 _COMPARED = [entry for entry in fields(AppState) if entry.compare]
+VIEW = ("exaggeration", "component", "nodes", "shown", "look", "machine", "rotary", "picked",
+        "lever")  # fmt: skip
+"""How the machine is looked at: a change of these alone is no step of the history."""
 
 
 def changes(old: AppState, new: AppState) -> dict[str, str]:
@@ -67,6 +70,8 @@ def _leaf_changes(old: AppState, new: AppState, group: str) -> Iterator[tuple[st
 
 
 def _equal(old: object, new: object) -> bool:
+    if isinstance(old, Comparison) and isinstance(new, Comparison):
+        old, new = old.sides, new.sides
     try:
         return old is new or bool(old == new)
     except ValueError:  # arrays
@@ -83,11 +88,24 @@ _MISSING = object()
 def merged(old: AppState, new: AppState, present: AppState) -> AppState:
     """Apply the change from an old state to a new one to the present state; its page stays.
 
-    Raises `OptionError` where another tab has changed the same value.
+    Of the view, what has been changed since stays, unless the machine is another one. Raises
+    `OptionError` where another tab has changed the same value.
     """
-    states = old, new, present
-    names = [entry.name for entry in _COMPARED if entry.name != "review"]
-    values = {name: _merge(*(getattr(state, name) for state in states)) for name in names}
+    states, values = (old, new, present), dict[str, Any]()
+    is_same_machine = all(
+        _equal(getattr(old.scene, name), getattr(new.scene, name))
+        for name in ("machine", "workspace")
+    )
+    for name in [entry.name for entry in _COMPARED if entry.name != "review"]:
+        is_view, sides = name in VIEW, [getattr(state, name) for state in states]
+        if is_view and not is_same_machine and name not in KEPT_FIELDS:
+            values[name] = sides[1]
+            continue
+        try:
+            values[name] = _merge(*sides)
+        except OptionError:
+            if not is_view:
+                raise
     notes = _merge(*({note.id: note for note in state.review} for state in states))
     return replace(present, **values, review=tuple(notes.values()))
 
@@ -230,10 +248,13 @@ class StateStore:
 
     def _push(self, state: AppState, at: float) -> None:
         document, before = self._document, self.state
-        changed = changes(before, state)
+        seen = {name: getattr(state, name) for name in ("page", "forms", *VIEW)}
+        if _equal(before.comparison, state.comparison):  # perhaps with another side drawn
+            seen["comparison"] = state.comparison
+        changed = changes(replace(before, **seen), state)
         if not changed:
-            if (state.page, state.forms) != (before.page, before.forms):
-                document.state = replace(before, page=state.page, forms=state.forms)
+            if any(getattr(before, name) != value for name, value in seen.items()):
+                document.state = replace(before, **seen)
             return
         past = self.past
         is_same = past and not self.future and past[-1].changed == changed
