@@ -46,7 +46,7 @@ def marks(picture: LivePicture) -> list[LegendMark]:
     """List ends, limit and statistics of the coloured quantity, in ascending order."""
     low, high = picture.scale.low, picture.scale.high
     named = sorted([("", low), ("", high), *marked(picture).items()], key=lambda mark: mark[1])
-    values = np.array([value for _, value in named])
+    values, drawn = np.array([value for _, value in named]), picture.shown_values
     at: list[float] = ((np.clip(values, low, high) - low) / (high - low)).tolist()
     placed, beyond = list(at), int((values > high).sum())
     for i in range(1, len(placed)):
@@ -57,6 +57,11 @@ def marks(picture: LivePicture) -> list[LegendMark]:
         f"{name} {spell_short(value) if name in ('', 'limit') else number(value)}".strip()
         for name, value in named
     ]
+    # an end that is exceeded: of a fixed range, or while a slider is dragged
+    if drawn.size and drawn.max() > high:
+        spelt[named.index(("", high))] = f"> {spell_short(high)}"
+    if drawn.size and drawn.min() < low:
+        spelt[named.index(("", low))] = f"< {spell_short(low)}"
     return list(map(LegendMark, [name for name, _ in named], spelt, at, placed))
 
 
