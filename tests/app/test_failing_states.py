@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from app.wire import opened
 from reliability.failing import ERRORS, STAGES, WAYS, Review, reviewed
 from warpspace.app.evaluation import live_picture
-from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.evaluation.live_model import DrawnScale, LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.resources import scenes_dir
@@ -96,10 +96,10 @@ def test_a_scene_whose_part_cannot_be_read_opens_with_a_message(tmp_path: Path) 
 def test_a_story_whose_step_cannot_be_evaluated_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     evaluate = LiveModel.evaluate
 
-    def fail(self: LiveModel, state: AppState) -> LivePicture:
+    def fail(self: LiveModel, state: AppState, *scale: DrawnScale | None) -> LivePicture:
         if is_told:
             raise MemoryError
-        return evaluate(self, state)
+        return evaluate(self, state, *scale)
 
     is_told = list[bool]()
     monkeypatch.setattr(LiveModel, "evaluate", fail)

@@ -115,6 +115,28 @@ def test_two_machines_are_compared_with_a_picture_in_three_actions(tab, renderer
 
 
 @pytest.mark.daily
+def test_the_slider_that_is_held_keeps_the_scales_until_it_is_released(tab):
+    bar = tab.page.locator("input[type=range][data-set='errors:set.EA0Z']")
+    box, mouse = bar.bounding_box(), tab.page.mouse
+    before = tab.session.context.picture
+
+    mouse.move(box["x"] + 0.6 * box["width"], box["y"] + box["height"] / 2)
+    mouse.down()
+    mouse.move(box["x"] + 0.99 * box["width"], box["y"] + box["height"] / 2, steps=5)
+    tab.until(lambda: tab.state.amplitudes["EA0Z"] > 90.0)
+    tab.until(lambda: tab.session.context.picture.state.amplitudes is tab.state.amplitudes)
+    held = tab.session.context.picture
+    assert (held.exaggeration, held.scale) == (before.exaggeration, before.scale)
+    mouse.up()
+    tab.until(lambda: tab.session.context.picture.scale.high > before.scale.high)
+    tab.until(lambda: tab.session._drag_start is None)
+    bar.focus()  # a key that is held is a drag, too
+    tab.page.keyboard.down("ArrowLeft")
+    tab.until(lambda: tab.session._drag_start is not None)
+    tab.page.keyboard.up("ArrowLeft")
+    tab.until(lambda: tab.session._drag_start is None)
+
+
 def test_a_drag_ends_where_the_hand_stopped_and_digits_set_a_number(tab):
     slider = tab.page.locator("input[type=range][data-set='errors:set.EA0Z']")
     drag = "for (let i = 0; i < 40; i++) warpspacePage.send('errors:set.EA0Z', 33.9 - i);"

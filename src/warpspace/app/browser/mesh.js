@@ -33,6 +33,7 @@
 
   window.warpspaceMesh = {
     glide: 0,  // duration of the next changes, ms; between steps of a story
+    next: 0,  // duration of the next change only, ms
     moves: 0,  // number of changes, for benchmarks
     // number of points, colour table; of each set of lines the points of their ends, and their offsets
     open({ count, palette, lines }) {
@@ -49,9 +50,11 @@
       const size = at.color.itemSize, shade = at.color.array.slice();
       for (let i = 0; i < level.length; i++)
         for (let k = 0; k < 3; k++) shade[size * i + k] = palette[3 * level[i] + k];
-      const current = ++turn, was = this.glide && [at.position.array.slice(), at.color.array.slice()];
+      const duration = this.next || this.glide;
+      this.next = 0;
+      const current = ++turn, was = duration && [at.position.array.slice(), at.color.array.slice()];
       const mixed = (from, to, share) => share < 1 ? to.map((x, i) => from[i] + share * (x - from[i])) : to;
-      this.eased(this.glide, share => {
+      this.eased(duration, share => {
         if (current === turn) draw(mesh, mixed(was[0], place, share), mixed(was[1], shade, share));
       });
       this.moves++;

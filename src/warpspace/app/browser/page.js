@@ -150,21 +150,34 @@
       if (twin?.tagName === "INPUT") twin.value = node.value;
       else if (twin) twin.firstChild.data = node.value.replace("-", "−");
     } else if (node.dataset?.set) node.dataset.dirty = "1";
+    if (name && node.type === "range" && !known.drags && !name.startsWith("playback:")) {
+      known.drags = true;
+      pending.push(["tab:hold", ""]);  // with the first value of the drag
+    }
     if (name) send(name, valueOf(node));
   });
+  // the end of a drag, by pointer or key: the drawing chooses its scales again
+  const release = () => {
+    if (known.drags) send("tab:release");
+    known.drags = false;
+  };
+  for (const type of ["keydown", "keyup", "blur"])
+    addEventListener(type, () => {
+      known.pressed = type === "keydown";
+      if (!known.pressed) release();
+    }, true);
   shell.addEventListener("change", event => {
     const node = event.target;
     delete node.dataset?.dirty;
     if (node.dataset?.set) send(node.dataset.set, valueOf(node));
+    if (!known.pressed) release();
     if (node.dataset?.set === AUTHOR) try { localStorage.setItem(AUTHOR_KEY, node.value); } catch { /* no storage */ }
   });
   for (const [type, pressed] of [["pointerdown", true], ["pointerup", false], ["pointercancel", false]])
     addEventListener(type, event => {
       for (const node of pressed ? [event.target] : shell.querySelectorAll("[data-held]"))
-        if (node.type === "range") {
-          if (pressed) node.dataset.held = "1"; else delete node.dataset.held;
-          send("page:hold", pressed ? "1" : "");  // all its changes are one step of undo
-        }
+        if (node.type === "range") { if (pressed) node.dataset.held = "1"; else delete node.dataset.held; }
+      if (!pressed) release();
     }, true);
   shell.addEventListener("focusout", event => { delete event.target.dataset?.held; });
 

@@ -66,12 +66,18 @@ def _beyond(value: float, high: float) -> str:
     return " ↑" if value > high else ""
 
 
-def ticks(scale: ColourScale) -> list[tuple[str, float]]:
+def ticks(scale: ColourScale, drawn: Array = np.zeros(0)) -> list[tuple[str, float]]:
     """List the ends and round values of a scale, with their heights relative to the bar."""
     span, apart = scale.high - scale.low, 1.2 * APART
     inner = ((tick - scale.low) / span for tick in tick_values(scale.low, scale.high, MOST_TICKS))
     heights = [0.0, *(at for at in inner if apart < at < 1.0 - apart), 1.0]
-    return [(spell_short(scale.low + at * span), at) for at in heights]
+    spelt = [spell_short(scale.low + at * span) for at in heights]
+    # an end that is exceeded: of a fixed range, or while a slider is dragged
+    if drawn.size and drawn.max() > scale.high:
+        spelt[-1] = f"> {spelt[-1]}"
+    if drawn.size and drawn.min() < scale.low:
+        spelt[0] = f"< {spelt[0]}"
+    return [*zip(spelt, heights, strict=True)]
 
 
 def marked(picture: LivePicture) -> dict[str, float]:
@@ -104,7 +110,7 @@ def legend_html(picture: LivePicture) -> Markup:
     )  # fmt: skip
     numbers = join(
         tag("i", text, style=f"bottom:{100.0 * at:.2f}%", class_="ws-tick")
-        for text, at in ticks(scale)
+        for text, at in ticks(scale, picture.shown_values)
     )
     leads = join(
         fill('<path d="M0 {y}L3 {y}L10 {to}"/>', y=f"{100.0 - 100.0 * mark.at:.1f}",

@@ -35,13 +35,27 @@ Response: TypeAlias = tuple[tuple[Any, ErrorBasis], ...]
 """A grid, and the traces of rotary axes if any, each with its first-order response."""
 
 
+@dataclass(frozen=True, slots=True)
+class DrawnScale:
+    """Exaggeration and colours in place of those of a state; None for its own colours."""
+
+    exaggeration: float
+    colours: ColourScale | None = None
+
+
 class LiveModel:
     """Evaluates states into pictures; shared by all sessions, thread-safe."""
 
     def __init__(self) -> None:
         self._cache: Cache[Any] = Cache(CACHE_BYTES)
 
-    def evaluate(self, state: AppState) -> LivePicture:
+    def evaluate(self, state: AppState, drawn: DrawnScale | None = None) -> LivePicture:
+        if drawn is not None:
+            picture = self.evaluate(replace(state, exaggeration=drawn.exaggeration))
+            colours, slices = drawn.colours, picture.slices
+            if colours is not None:
+                slices = tuple(replace(piece, colours=colours) for piece in slices)
+            return replace(picture, state=state, colours=colours or picture.colours, slices=slices)
         if state.comparison.b is not None:
             return compare_pictures(self._single, state)
         return self._single(state)

@@ -278,8 +278,6 @@ class PagePanel(Panel):
         }
         if action in actions:
             context.call_soon(actions[action])
-        if action == "hold":  # a slider was pressed, or released
-            context.held_since = context.changed_at if value == "1" else None
         updates: dict[str, Callable[[], AppState]] = {
             "task": partial(put, state, "page.task", value),
             "fold": partial(toggled, state, "page.open", value),

@@ -31,7 +31,7 @@ from warpspace.app.drawing.box import BoxLayer
 from warpspace.app.drawing.camera import focus
 from warpspace.app.drawing.moving import MovingLayer
 from warpspace.app.drawing.shapes import SCENE_PER_MM
-from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.evaluation.live_model import DrawnScale, LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import pick, pick_line, with_clicked
 from warpspace.app.panels.note_panels import StoryPanel
@@ -141,6 +141,7 @@ logger = logging.getLogger(__name__)
 TAB = "tab"  # prefix of events of the page itself
 TOKEN_WAIT_S = 0.25  # the first picture waits for the token of a tab that reconnects
 MOST_QUEUED, BEHIND_S = 4, 0.02  # messages to a slow page, and the wait for it to read them
+RESCALE_MS = 250  # animation of the box at the end of a drag
 ANSWER_S = 1.0  # after which a page that does not report its drawing is sent the surroundings
 _TURNS: deque[object] = deque()  # of tabs whose picture is being made, or waits
 _CHANGED = threading.Condition()
@@ -161,6 +162,15 @@ def turn() -> Generator[None]:
             _CHANGED.notify_all()
 
 
+SCALED_BY = ("exaggeration", "component", "look", "loop", "placed", "comparison", "specification")
+"""Fields of the state that choose exaggeration and colours; they end the scales of a drag."""
+
+
+def same_scales(before: AppState, after: AppState) -> bool:
+    same = all(getattr(before, name) is getattr(after, name) for name in SCALED_BY)
+    return same and focus(before) == focus(after)
+
+
 class Session:
     def __init__(
         self,
@@ -178,6 +188,9 @@ class Session:
         self.display = Display(context)
         # latest states that the map, and all panels, have been evaluated for
         self._shown = self._settled = self._checkpoint()
+        # scales of the drawing where they are not those of its state; the picture as a drag began
+        self._scale: DrawnScale | None = None
+        self._drag_start: LivePicture | None = None
         self._failing = set[object]()  # panels and layers that fail in any state
         self._is_identified = False  # whether the page has sent its token
         self._surroundings_due_at: float | None = None  # at the latest
@@ -352,6 +365,10 @@ class Session:
     def _handle_tab_event(self, event: Event) -> None:
         if event.word == "drawn" and self._surroundings_due_at is not None:
             self._surroundings_due_at = 0.0
+        if event.word in ("hold", "release"):
+            is_held, context = event.word == "hold", self.context
+            self._drag_start = context.picture if is_held else None
+            context.held_since = context.changed_at if is_held else None
         if event.word != "here" or self._is_identified:
             return
         self._is_identified = True
@@ -378,12 +395,16 @@ class Session:
         now, state, picture = self._checkpoint(), self.state, context.picture
         if picture is None:  # the page could not be built
             return
+        before, self._scale = self._scale, self._drawn_scale(state)
         if context.camera.wanted and focus(picture.state) == focus(state):
             context.camera.place(picture)
-        if notes or state is not picture.state:
+        if notes or state is not picture.state or self._scale != before:
+            if before is not None and before.colours is not None and self._scale is None:
+                context.page.run_script(f"warpspaceMesh.next = {RESCALE_MS};")
             try:
                 with turn():
-                    self._show(self._live.evaluate(state), picture, force=bool(notes))
+                    shown = self._live.evaluate(state, self._scale)
+                    self._show(shown, picture, force=bool(notes))
             except Exception as error:
                 if not self._revert(error, now, self._shown):
                     raise
@@ -392,6 +413,13 @@ class Session:
             self._shown = now
         if notes:
             context.notify("Please note", "\n".join(notes), "warning")
+
+    def _drawn_scale(self, state: AppState) -> DrawnScale | None:
+        """Return the scales of the drawing; None where they are those of the state."""
+        start = self._drag_start
+        if start is not None and same_scales(start.state, state):
+            return DrawnScale(start.exaggeration, start.scale)
+        return None
 
     def _show(self, picture: LivePicture, before: LivePicture, *, force: bool) -> None:
         context = self.context

@@ -1,0 +1,102 @@
+"""A drag keeps exaggeration and colour range; both are chosen again at its end."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.parts import LIVE
+from app.wire import opened
+from warpspace.app.documents import legend
+from warpspace.app.evaluation.compare import with_pin
+from warpspace.app.evaluation.live_model import DrawnScale
+from warpspace.app.server.session import same_scales
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.tree import put
+from warpspace.scene.library import load_scene
+
+FIRST = load_scene("dvf5000_first")
+START = start_state(FIRST, nodes=5)
+
+
+def drag(wire, name, *values):
+    wire.say("tab:hold")
+    for value in values:
+        wire.say(name, value)
+
+
+def test_a_drag_keeps_exaggeration_and_colours_until_its_end():
+    with opened(FIRST) as (wire, session):
+        before = session.context.picture
+        drag(wire, "errors:set.EA0Z", "200", "400")
+        assert wire.read_until(lambda: session.context.picture.state.amplitudes["EA0Z"] == 400.0)
+        held = session.context.picture
+        assert held.exaggeration == before.exaggeration
+        assert held.scale == before.scale
+        assert held.state.exaggeration is None  # nothing that is saved
+        assert np.abs(held.drawn_mm - before.drawn_mm).max() > 100.0  # the increase is drawn
+        end = f"&gt; {before.scale.high:g}<"
+        assert wire.read_until(lambda: end in wire.pieces["legend"])
+        wire.say("tab:release")
+        assert wire.read_until(lambda: session.context.picture.exaggeration < held.exaggeration)
+        after = session.context.picture
+        chosen = LIVE.evaluate(session.state)
+        assert (after.exaggeration, after.scale) == (chosen.exaggeration, chosen.scale)
+        assert wire.read_until(lambda: end not in wire.pieces["legend"])
+
+
+def test_a_typed_number_rescales_at_once():
+    with opened(FIRST) as (wire, session):
+        wire.say("errors:set.EA0Z", "400")
+        assert wire.read_until(lambda: session.context.picture.state.amplitudes["EA0Z"] == 400.0)
+        assert session.context.picture.exaggeration == LIVE.evaluate(session.state).exaggeration
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        START,
+        put(START, "look.drawing", "rotary").with_amplitude("EB0C", 20.0),
+        put(with_pin(START).with_amplitude("EA0Z", 60.0), "comparison.shown", "a"),
+        put(with_pin(START).with_amplitude("EA0Z", 60.0), "comparison.shown", "difference"),
+        put(START, "look.surface", "slices"),
+    ],
+    ids=["volume", "rotary axes", "comparison", "difference", "slices"],
+)
+def test_every_drawing_keeps_the_scales_of_a_drag(state):
+    before = LIVE.evaluate(state)
+    after = state.with_amplitude("EA0Z", 500.0).with_amplitude("EB0C", 500.0)
+    assert same_scales(state, after)
+    held = LIVE.evaluate(after, DrawnScale(before.exaggeration, before.scale))
+    assert (held.exaggeration, held.scale) == (before.exaggeration, before.scale)
+    assert {piece.exaggeration for piece in held.slices} <= {before.exaggeration}
+    assert {piece.scale for piece in held.slices} <= {before.scale}
+    assert {of.exaggeration for of in held.traces} <= {before.exaggeration}
+    chosen = LIVE.evaluate(after)
+    assert held.state is after
+    assert np.array_equal(held.shown_values, chosen.shown_values)
+    assert chosen.exaggeration < held.exaggeration
+
+
+def test_another_drawing_ends_the_scales_of_a_drag():
+    for changed in (
+        put(START, "component", "x"),
+        put(START, "exaggeration", "100"),
+        put(START, "look.surface", "slices"),
+        put(START, "specification.limit_um", "10"),
+        with_pin(START),
+        replace(START, scene=load_scene("dvf5000_second")),
+    ):
+        assert not same_scales(START, changed)
+
+
+def test_both_ends_of_a_range_that_is_exceeded_say_so():
+    state = put(START, "component", "z")
+    picture = LIVE.evaluate(state)
+    low, high = picture.values.min() / 2.0, picture.values.max() / 2.0
+    assert low < 0.0 < high
+    narrow = DrawnScale(100.0, replace(picture.scale, low=low, high=high))
+    texts = [mark.text for mark in legend.marks(LIVE.evaluate(state, narrow)) if not mark.name]
+    assert [text[:2] for text in texts] == ["< ", "> "]
+    ends = [mark.text for mark in legend.marks(picture) if not mark.name]
+    assert all(text[0] not in "<>" for text in ends)
