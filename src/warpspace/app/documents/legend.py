@@ -66,16 +66,17 @@ def _beyond(value: float, high: float) -> str:
     return " ↑" if value > high else ""
 
 
-def ticks(scale: ColourScale, drawn: Array = np.zeros(0)) -> list[tuple[str, float]]:
+def ticks(scale: ColourScale, drawn: Array | None = None) -> list[tuple[str, float]]:
     """List the ends and round values of a scale, with their heights relative to the bar."""
+    low, high = (0.0, 0.0) if drawn is None or not drawn.size else (drawn.min(), drawn.max())
     span, apart = scale.high - scale.low, 1.2 * APART
     inner = ((tick - scale.low) / span for tick in tick_values(scale.low, scale.high, MOST_TICKS))
     heights = [0.0, *(at for at in inner if apart < at < 1.0 - apart), 1.0]
     spelt = [spell_short(scale.low + at * span) for at in heights]
     # an end that is exceeded: of a fixed range, or while a slider is dragged
-    if drawn.size and drawn.max() > scale.high:
+    if high > scale.high:
         spelt[-1] = f"> {spelt[-1]}"
-    if drawn.size and drawn.min() < scale.low:
+    if low < scale.low:
         spelt[0] = f"< {spelt[0]}"
     return [*zip(spelt, heights, strict=True)]
 
