@@ -68,15 +68,14 @@ def _beyond(value: float, high: float) -> str:
 
 def ticks(scale: ColourScale, drawn: Array | None = None) -> list[tuple[str, float]]:
     """List the ends and round values of a scale, with their heights relative to the bar."""
-    low, high = (0.0, 0.0) if drawn is None or not drawn.size else (drawn.min(), drawn.max())
     span, apart = scale.high - scale.low, 1.2 * APART
     inner = ((tick - scale.low) / span for tick in tick_values(scale.low, scale.high, MOST_TICKS))
     heights = [0.0, *(at for at in inner if apart < at < 1.0 - apart), 1.0]
     spelt = [spell_short(scale.low + at * span) for at in heights]
     # an end that is exceeded: of a fixed range, or while a slider is dragged
-    if high > scale.high:
+    if drawn is not None and drawn.max(initial=scale.high) > scale.high:
         spelt[-1] = f"> {spelt[-1]}"
-    if low < scale.low:
+    if drawn is not None and drawn.min(initial=scale.low) < scale.low:
         spelt[0] = f"< {spelt[0]}"
     return [*zip(spelt, heights, strict=True)]
 
