@@ -322,8 +322,8 @@ def setting(state: AppState, path: str, *, text: str = "", bar: bool = False) ->
     elif leaf.kind == "number":
         text = text or ("" if present is None else f"{present:.6g}")
         control = text_box(name, text, size="short", inputmode="decimal",
-                           placeholder=leaf.choices.get(""))  # fmt: skip
-        if bar and leaf.span is not None:
+                           placeholder=leaf.choices.get("", ""))  # fmt: skip
+        if bar and leaf.span is not None and present is not None:
             span, label = leaf.span, path.rpartition(".")[2]
             control = html.slider(name, present, span.low, span.high, span.step, label=leaf.label,
                              twin=name, text=f"{text} {leaf.unit}") + control  # fmt: skip
