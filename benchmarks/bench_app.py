@@ -66,7 +66,7 @@ SILENT = """{
   view.sendMessage = message => { if (message.type !== 'WarpspaceEvents') send(message); };
 }"""
 SETTLED_MS = 1500  # until what follows at rest has been sent and drawn, too
-MOVE = """async ([uuid, name, value]) => {
+MOVE = """async ([uuid, action, value]) => {
   const m = window.__viserMutable, { bend } = warpspaceMesh;
   const bent = new Promise((done, fail) => {
     warpspaceMesh.bend = function (...given) { bend.apply(this, given); done(); };
@@ -74,7 +74,7 @@ MOVE = """async ([uuid, name, value]) => {
   });
   const start = performance.now();
   if (uuid) m.sendMessage({type: 'GuiUpdateMessage', uuid, updates: {value: String(value)}});
-  else warpspacePage.send(name, value);
+  else warpspacePage.send(action, value);
   await bent;
   warpspaceMesh.bend = bend;
   // viser has drawn it in the same callback; reading waits until the renderer is done with it
@@ -82,9 +82,9 @@ MOVE = """async ([uuid, name, value]) => {
   gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
   return performance.now() - start;
 }"""
-SLIDER = "errors:set.EAX"
+SLIDER = '{"do":"SetError","key":"EAX"}'
 OURS_READY = f"""() => window.__viserMutable?.nodeRefFromName['/box/surface']
-    && document.querySelector('input[data-set="{SLIDER}"]')"""
+    && document.querySelector(`input[data-set='{SLIDER}']`)"""
 BARE_READY = "() => window.__viserMutable?.nodeRefFromName['/box/surface'] && window.warpspaceMesh"
 EMPTY_READY = "() => window.__viserMutable?.canvas"
 OPAQUE = "() => getComputedStyle(window.__viserMutable.canvas).opacity > 0.99"

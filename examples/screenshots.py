@@ -118,7 +118,9 @@ def open_task(page: Page, name: str) -> None:
 
 def unfold(page: Page, title: str) -> None:
     """Unfold a section of the task that is open."""
-    page.locator("#ws-right summary, #ws-right [data-do='page:fold']", has_text=title).first.click()
+    page.locator(
+        "#ws-right summary, #ws-right [data-do*=fold_section]", has_text=title
+    ).first.click()
     page.wait_for_timeout(PAUSE_MS)
 
 
@@ -141,7 +143,7 @@ def compared(page: Page) -> None:
 def ask_question(page: Page) -> None:
     """Show the lever of the largest contribution of the worst point."""
     unfold(page, "Details")
-    page.locator("[data-do='worst:lever'][data-value='EA0Z']").click()
+    page.locator("[data-do*=show_lever_of][data-do*=EA0Z]").click()
 
 
 def tested(page: Page) -> None:
@@ -197,14 +199,14 @@ def reported(page: Page) -> None:
 
 def noted(page: Page) -> None:
     """Open the list of review notes."""
-    page.locator("[data-do='notes:open']").first.click()
+    page.locator("[data-do=open_notes]").first.click()
 
 
 def open_story(page: Page) -> None:
     """Play the story up to its second step, which shows the lever arm of an error."""
     noted(page)
     press(page, "Play the story")
-    page.locator("[data-do='story:on']").click()
+    page.locator("[data-do=next_step]").click()
 
 
 def measured(page: Page) -> None:

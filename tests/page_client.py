@@ -23,6 +23,8 @@ import viser
 import websockets
 import zstandard
 
+from warpspace.app.browser import actions as do
+
 PROTOCOL = f"viser-v{viser.__version__}"
 HOW: dict[str, Any] = {"subprotocols": [PROTOCOL], "max_size": None, "compression": None}
 """How a page connects: arguments of `connect` of the package `websockets`."""
@@ -40,7 +42,7 @@ CAMERA = {
 }
 """What a page says first, once it is connected: where its camera stands."""
 CALL = re.compile(r"^warpspace(\w+\.[\w.]+)\((.*)\);$", re.MULTILINE)
-SLIDER = re.compile(r'data-set="(errors:set\.\w+)"')
+SLIDER = re.compile(r'data-set="[^"]*SetError[^"]*?(E\w+)&quot;}"')
 pack = msgspec.msgpack.encode
 
 
@@ -52,9 +54,14 @@ def unpack(raw: str | bytes) -> list[dict[str, Any]]:
     return msgspec.msgpack.decode(text)["messages"]
 
 
-def said(*events: tuple[str, object]) -> dict[str, Any]:
-    """Write the message of events: ``part:word`` and a value."""
-    return {"type": "WarpspaceEvents", "events": events}
+def said(*actions: object) -> dict[str, Any]:
+    """Write the message of actions, or of what takes their place."""
+    return {"type": "WarpspaceEvents", "events": actions}
+
+
+def selector(action: object, kind: str = "do") -> str:
+    """Return the selector of the elements that send an action."""
+    return f"[data-{kind}='{action}']"
 
 
 class Page:
@@ -190,7 +197,7 @@ class Tab(Page):
         self.socket = await dial(self._app, **patience)
         self._reader = asyncio.create_task(self._read())
         try:
-            await self.send(said(("tab:here", self.token)))
+            await self.send(said(do.TabHere(self.token)))
             await self.send(CAMERA)
             await until(lambda: self.stage == "open", patience_s)
         except BaseException:
@@ -207,7 +214,7 @@ class Tab(Page):
         await self.socket.send(pack(message))
 
     async def drag(self, key: str, value: float) -> None:
-        await self.send(said((f"errors:set.{key}", f"{value:g}")))
+        await self.send(said(do.SetError(key, f"{value:g}")))
 
     async def answer_s(self, value: float, key: str = "EAX") -> float:
         place, began = f"error.{key}", time.perf_counter()
@@ -228,4 +235,4 @@ class Tab(Page):
             if name == "Mesh.bend":
                 self.seen.append((time.perf_counter(), self.latest[name][0]))
             elif name == "Page.drawn":
-                await self.send(said(("tab:drawn", "")))
+                await self.send(said(do.Signal.DRAWN))

@@ -5,10 +5,13 @@ import base64
 import contextlib
 import secrets
 from collections.abc import AsyncGenerator
+from typing import Literal, get_args, get_origin
 
+import msgspec
 import websockets
 
 from page_client import CAMERA, App, dial, pack, said
+from warpspace.app.browser import actions as do
 
 TAG = "<img src=x onerror='window.taken=1'><script>window.taken=1</script>"
 NAN, HUGE = float("nan"), 10**18
@@ -22,34 +25,67 @@ PATHS = (
     "look.slices_mm.X", "shown.dark", "specification.limit_um", "machine.linear_mm.X", "scene",
     "__class__", "amplitudes.EXX", "page.task", "page.open", "", ".", "look.", "a." * 70,
 )  # fmt: skip
-WORDS = (
-    "open", "close", "fold", "task", "undo", "redo", "toggle", "run", "cancel", "apply", "preview",
-    "save", "report", "share", "link", "export", "view", "row", "only", "exclude", "find",
-    "file", "set.value", "set.EXX", "set.QQQ", "set.__class__", "set.", "", ":", TAG,
-)  # fmt: skip
+FIELDS = {
+    "panel": ("files", "test", "part", "nobody", TAG, "__class__"),
+    "option": ("fit", "x" * 41, TAG), "name": ("x.toml", TAG, "../../etc/passwd", "a.stl"),
+    "token": ("", TAG),
+    "key": ("EXX", "EQQ", "__class__", TAG), "path": PATHS, "index": (0, 9, 9_999_999),
+    "card": (0, 7), "number": (0, 9), "size": (0, HUGE), "save": (True, False),
+    "ray": ((0.0,) * 6, (1e9, 0, 0, 0, 0, 1)), "width": (120, 16_384), "height": (120, 16_384),
+    "top": (0, 999_999), "bottom": (0, 999_999), "right": (0, 999_999),
+    "content": ("", "²", "eA=="),
+}  # fmt: skip
+"""What a field may hold; of those that are not listed, and allow any text, `VALUES`."""
 
 
-def events(parts: list[str]) -> list[tuple[str, str]]:
-    """Give events that no page sends: to every part every word, and every path, with any value."""
-    names = [f"{part}:{word}" for part in (*parts, "nobody", TAG, "") for word in WORDS]
-    names += [f"state:set.{path}" for path in PATHS]
-    return [
-        (name, VALUES[(number + turn) % len(VALUES)])
-        for turn in range(3)
-        for number, name in enumerate(names)
-    ]
+def actions(turns: int = 12) -> list[do.AnyAction]:
+    """Give actions that pass the decoder and mean nothing: of every kind, with any values."""
+    found: list[do.AnyAction] = [*do.Signal]
+    for turn in range(turns):
+        found += [entry(VALUES[(turn + at) % len(VALUES)]) for at, entry in enumerate(do.Input)]
+        for kind in do.Action.__subclasses__() + do.PanelAction.__subclasses__():
+            if kind in (do.PanelAction, do.InputValue):
+                continue
+            values = {}
+            for at, field in enumerate(msgspec.structs.fields(kind)):
+                texts = [value[:40] if field.type is do.Name else value for value in VALUES]
+                allowed = get_args(field.type) if get_origin(field.type) is Literal else texts
+                choices = FIELDS.get(field.name, allowed)
+                values[field.name] = choices[(turn + at) % len(choices)]
+            found.append(kind(**values))
+    return found
 
 
 def carried() -> list[bytes]:
-    """Give messages of events that no page sends."""
-    events = [
-        "", {}, None, [[]], [[1]], [[1, "page:undo", ""]], [["page:undo", None]], [[1, 2]],
-        [[NAN, "page:undo"]], [["page:undo", [["page:undo", ""]]]], [["no colon", ""]],
-        [[f"a:{'b' * 200}", ""]], [["errors:set.EXX", "9" * 20_001]], [["page:undo", ""]] * 17,
-        [["page:undo", ""], ["page:undo"]],
+    """Give messages of actions that no page sends."""
+    leaf = {"do": "SetLeaf", "path": "look.surface", "value": "grid"}
+    wrong = [
+        {**leaf, "do": "set_leaf"}, {**leaf, "do": ""}, {**leaf, "do": None}, {**leaf, "extra": 1},
+        {**leaf, "path": "x" * 161}, {**leaf, "path": 1}, {**leaf, "path": None},
+        {**leaf, "value": 1}, {**leaf, "value": ["grid"]}, {**leaf, "value": "9" * 20_001},
+        {"do": "SetLeaf"}, {"path": "look.surface"}, {"do": "Action"}, {"do": "PanelAction"},
+        {"do": "Run"}, {"do": "Run", "panel": TAG * 9}, {"do": "Apply", "panel": "adjust"},
+        {"do": "Apply", "panel": "adjust", "card": -1}, {"do": "Apply", "panel": "a", "card": "0"},
+        {"do": "Apply", "panel": "a", "card": 0.5}, {"do": "Apply", "panel": "a", "card": HUGE},
+        {"do": "InputValue", "input": "undo"}, {"do": "InputValue", "input": TAG},
+        {"do": "ShowMachine", "look": TAG}, {"do": "WriteReport", "ending": ".exe"},
+        {"do": "ShowDrawing", "value": "<b>"}, {"do": "ViewFrom", "view": "<script>"},
+        {"do": "ShowBox", "box": "<b>"}, {"do": "EditNote", "note": "a", "edit": "x"},
+        {"do": "SaveResult", "panel": "gains", "format": "exe"},
+        {"do": "PointAt", "ray": [1, 2, 3], "author": ""},
+        {"do": "PointAt", "ray": [NAN, 0, 0, 0, 0, 1], "author": ""},
+        {"do": "PointAt", "ray": [1e300, 0, 0, 1, 1, 1], "author": ""},
+        {"do": "Resize", "width": 50, "height": 700, "top": 80, "bottom": 50, "right": 90},
+        {"do": "Resize", "width": 900, "height": 700, "top": 80, "bottom": 50, "right": -5},
+        {"do": "Resize", "width": NAN, "height": 700, "top": 80, "bottom": 50, "right": 90},
+        {"do": "Resize", "width": HUGE, "height": 700, "top": 80, "bottom": 50, "right": 90},
+        {"do": "Upload", "panel": "files", "name": "x", "size": -1, "content": ""},
+        {"do": "TabHere", "token": "x" * 101},
+        "no signal", "UNDO", "", 1, None, [], {}, ["undo", ""],
     ]  # fmt: skip
+    events = ["", {}, None, [[]], ["undo"] * 17, *([one] for one in wrong), ["undo", *wrong[:1]]]
     found = [pack({"type": "WarpspaceEvents", "events": one}) for one in events]
-    return [*found, pack({"type": "WarpspaceEvents"}), pack({**said(("a:b", "")), "extra": 1})]
+    return [*found, pack({"type": "WarpspaceEvents"}), pack({**said("undo"), "extra": 1})]
 
 
 def camera(**fields: object) -> bytes:
@@ -86,9 +122,8 @@ def nonsense() -> list[bytes]:
     ]  # fmt: skip
 
 
-def upload(name: str, content: bytes) -> tuple[str, str]:
-    coded = base64.b64encode(content).decode()
-    return "files:file", f"{len(content)}\n{name}\n{coded}"
+def upload(name: str, content: bytes, panel: str = "files") -> do.Upload:
+    return do.Upload(panel, name, len(content), base64.b64encode(content).decode())
 
 
 @contextlib.asynccontextmanager

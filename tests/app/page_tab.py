@@ -134,9 +134,9 @@ class Tab:
             self.actions += 1
             self.page.keyboard.press(key)
 
-    def send(self, name: str, value: object = "") -> None:
-        """Send an event as a page does, or as a hostile one might."""
-        self.page.evaluate("([name, value]) => warpspacePage.send(name, value)", [name, value])
+    def send(self, action: object) -> None:
+        """Send an action as a page does."""
+        self.page.evaluate("action => warpspacePage.send(action)", str(action))
 
     # --- what is seen --------------------------------------------------------------------------
 

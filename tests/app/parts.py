@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from warpspace.analysis.registry import entries
+from warpspace.app.browser.actions import AnyAction, Input, Upload
 from warpspace.app.documents.output_services import Services
 from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.evaluation.live_model import LiveModel
@@ -46,7 +47,7 @@ class Alone:
         self.context = Nobody(
             call_soon=self._call, store=self.store, picture=LIVE.evaluate(state),
             notify=lambda *words: self.said.append(words), post=self.store.apply, report_results=[],
-            send=lambda *event: self.sent.append(event), dialog_closed=lambda: None,
+            send=self.sent.append, dialog_closed=lambda: None,
             save_file=lambda *file: self.saved.append(file), fit_view=lambda: None,
             offers={}, page=SimpleNamespace(
                 report=lambda error: self.said.append(("", str(error))),
@@ -63,10 +64,11 @@ class Alone:
         except WarpspaceError as error:  # as the session says it
             self.said.append(("", str(error)))
 
-    def do(self, word: str, value: str = "") -> Any:
-        """Do what an event says; give what is shown then."""
-        self.store.apply(lambda state: self.part.handle(state, word, value))
-        while word in ("file", "bundled", "set.unit") and self.context.jobs:
+    def do(self, action: AnyAction) -> Any:
+        """Do what an action says; give what is shown then."""
+        self.store.apply(lambda state: self.part.handle(state, action))
+        reads = isinstance(action, Upload) or getattr(action, "input", "") == Input.ADD_READINGS
+        while reads and self.context.jobs:
             time.sleep(0.01)  # files are parsed beside the session
         self.context.picture = LIVE.evaluate(self.store.state)
         return self.store.state

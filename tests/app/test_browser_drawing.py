@@ -5,6 +5,7 @@ import re
 import numpy as np
 
 from app.page_tab import SCENES, same_points
+from warpspace.app.browser import actions as do
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.machine_bodies import drawn_bodies, tool_point
 from warpspace.app.state.app_state import start_state
@@ -19,7 +20,7 @@ def test_surfaces_slices_isolines_and_marks(tab):
     def draws(*sent):
         state = START
         for path, value in sent:
-            tab.send(f"state:set.{path}", value)
+            tab.send(do.SetLeaf(path, str(value)))
             state = put(state, path, value)
         tab.until(lambda: tab.shows_state(state))
         tab.until(lambda: tab.drawn("/box/grid") is not None)
@@ -27,7 +28,7 @@ def test_surfaces_slices_isolines_and_marks(tab):
 
     draws(("look.surface", "cut"))
     draws(("look.surface", "slices"), ("look.slices_mm.X", "4"))
-    tab.send("state:set.look.surface", "grid")
+    tab.send(do.SetLeaf("look.surface", "grid"))
     tab.until(lambda: tab.drawn("/box/grid") is None)
     picture = draws(("look.surface", "surface"))
     worst = picture.drawn_mm[np.unravel_index(np.argmax(picture.values), picture.values.shape)]
@@ -48,31 +49,31 @@ def test_the_machine_moves_bends_and_carries_the_tool_point(tab):
         wanted = {p.body.name: p.vertices_mm for p in drawn_bodies(LIVE.evaluate(state))}
         return all(same_points(tab.drawn(f"/machine/{name}"), wanted[name]) for name in wanted)
 
-    tab.send("controls:machine", "solid")
+    tab.send(do.ShowMachine("solid"))
     state = put(START, "machine.shown", "1")
     tab.until(lambda: stands(state))
     for path, value in (
         *(("machine.linear_mm.X", "200"), ("machine.linear_mm.Y", "-150")),
         *(("machine.linear_mm.Z", "-400"), ("positions.B", "-30")),
     ):
-        tab.send(f"state:set.{path}", value)
+        tab.send(do.SetLeaf(path, str(value)))
         state = put(state, path, value)
     tab.until(lambda: stands(state))
     point = tool_point(LIVE.evaluate(state))[0]
     tab.until(lambda: np.allclose(tab.place("/machine/tool_point"), point, atol=0.01))
-    tab.send("state:set.machine.bent", 0)
+    tab.send(do.SetLeaf("machine.bent", "0"))
     tab.until(lambda: stands(put(state, "machine.bent", "0")))
     assert not stands(state)
-    tab.send("controls:machine", "ghost")
+    tab.send(do.ShowMachine("ghost"))
     tab.until(lambda: tab.drawn("/machine/R_bed") is None)
     tab.until(lambda: tab.drawn("/ghost_machine/R_bed") is not None)
-    tab.send("controls:machine", "off")
+    tab.send(do.ShowMachine("off"))
     tab.until(lambda: tab.drawn("/ghost_machine/R_bed") is None)
 
 
 def test_the_table_turns_until_the_page_is_left(open_tab):
     tab = open_tab()
-    tab.send("controls:machine", "solid")
+    tab.send(do.ShowMachine("solid"))
     tab.until(lambda: tab.drawn("/machine/C_table") is not None)
     still, stage = tab.still(lambda: tab.drawn("/machine/C_table")), tab.session.context.stage
     tab.task("Machine")

@@ -9,6 +9,8 @@ from axe_playwright_python.sync_playwright import Axe
 from app.frames import new_visitor
 from app.page_tab import SCENES, Tab, wait_until_open
 from app.wire import end_work
+from page_client import selector
+from warpspace.app.browser import actions as do
 from warpspace.app.documents.scene_file import state_to_toml
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
@@ -63,15 +65,15 @@ def test_words_of_a_scene_are_never_run(browser):
         page = tab.page
         tab.until(lambda: words in page.title())
         for window in ("scenes", "files", "report", "help"):
-            tab.send("page:open", window)
+            tab.send(do.Input.OPEN_DIALOG(window))
             page.wait_for_selector(f"[data-key=window-{window}]")
             tab.press("Escape")
         tab.give("evil.toml", state_to_toml(start_state(evil)).encode(),
                  lambda: page.get_by_role("button", name="Open", exact=True).click())  # fmt: skip
         tab.until(lambda: tab.state.scene.title.startswith("U "))
-        tab.send("compare:pin")
+        tab.send(do.Signal.PIN_AS_A)
         for task in TASKS:
-            tab.send("page:task", task)
+            tab.send(do.SetLeaf("page.task", task))
             page.wait_for_selector(f"#ws-task-{task}[aria-selected=true]")
         tab.says("U <img src=x")
         assert page.evaluate("window.taken") is None
@@ -102,7 +104,7 @@ def test_an_error_is_found_set_and_undone_without_a_mouse(tab):
     keys("Enter")
     tab.until(lambda: tab.state.amplitudes["EC0Y"] == -12.5)
     # the focus is on its slider again, and stays there while the page is written anew
-    slider = "document.activeElement.dataset.set === 'errors:set.EC0Y'"
+    slider = f"document.activeElement.matches(`{selector(do.SetError('EC0Y'), 'set')}`)"
     tab.until(lambda: page.evaluate(slider))
     keys("ArrowRight")
     tab.until(lambda: tab.state.amplitudes["EC0Y"] > -12.5)
@@ -164,21 +166,21 @@ def test_a_screen_reader_finds_landmarks_headings_and_names(tab, themes):
             tab.page.wait_for_selector(f"#ws-task-{task}[aria-selected=true]")
             for name in tab.session.display.panels["tasks"].sections[task]:
                 if not dark and name not in tab.state.page.open:
-                    tab.send("page:fold", name)
+                    tab.send(do.Input.FOLD_SECTION(name))
                 place = f"[data-piece='section.{name}']"
                 tab.page.wait_for_selector(f"{place} .ws-body, {place} > .ws-section:not(details)",
                                            state="attached")  # fmt: skip
             tab.page.evaluate(UNFOLD)
             assert serious(tab) == [], task
         for window in ("scenes", "files", "report", "help", "machines"):
-            tab.send("page:open", window)
+            tab.send(do.Input.OPEN_DIALOG(window))
             tab.page.wait_for_selector(f"[data-key=window-{window}]")
             assert serious(tab) == [], window
             tab.page.keyboard.press("Escape")
-        tab.send("page:close")
+        tab.send(do.Signal.CLOSE_DIALOG)
         tab.page.wait_for_selector("#ws-window:not([open])", state="attached")
         for text in ("Why here?", "") if not dark else ("",):
-            tab.send("notes:pin")
+            tab.send(do.Input.PIN_NOTE())
             tab.page.locator("#ws-notes textarea:focus").wait_for()
             if text:
                 tab.page.keyboard.type(text)
@@ -186,7 +188,7 @@ def test_a_screen_reader_finds_landmarks_headings_and_names(tab, themes):
                 tab.click("Add to story")
                 tab.page.locator("#ws-notes textarea").wait_for(state="detached")
         assert serious(tab) == []
-        tab.send("notes:close")
+        tab.send(do.Signal.CLOSE_NOTES)
     for landmark in ("banner", "navigation", "main", "complementary"):
         assert tab.page.get_by_role(landmark).count() == 1, landmark
     for role, name in (("heading", "^Errors up to 51.7 µm"), ("slider", "^EAX roll of X$")):

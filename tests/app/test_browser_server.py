@@ -12,7 +12,8 @@ import viser
 from app.frames import new_visitor
 from app.page_tab import Tab, open_page, wait_until_open
 from app.wire import end_work
-from page_client import running_app
+from page_client import running_app, selector
+from warpspace.app.browser import actions as do
 from warpspace.app.server.request_policy import Access
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
@@ -92,7 +93,7 @@ def test_a_tab_with_the_token_lives_on(browser):
         tab.until(lambda: "token" not in tab.page.evaluate("document.cookie"))
         tab.until(lambda: "token" not in tab.page.url)
         tab.until(lambda: "fixedDpr=1" in tab.page.url)
-        tab.send("errors:set.EXX", "7")
+        tab.send(do.SetError("EXX", "7"))
         tab.until(lambda: tab.state == moved)
         tab.page.reload()
         wait_until_open(tab.page)
@@ -142,7 +143,7 @@ def wait_for(page, wanted, *, other=False):
 def change(page):
     """Change an error; give what is said of it once the tab has kept it."""
     before = maximum(page)
-    page.evaluate("warpspacePage.send('errors:set.EAX', '-80')")
+    page.evaluate("action => warpspacePage.send(action)", str(do.SetError("EAX", "-80")))
     wait_for(page, before, other=True)
     page.wait_for_function(
         "JSON.parse(sessionStorage.getItem('warpspace-kept') ?? '{}').text?.includes('EAX=-80')"
@@ -175,7 +176,7 @@ def test_killed_server_is_said_and_its_tab_restored(browser, tmp_path):
         said = page.inner_text(BOX)
         assert "This tab is restored" in said
         assert "Not restored: the history of Undo and Redo;" in said
-        assert page.get_attribute("[data-box='errors:set.EAX']", "data-text") == "-80"
+        assert page.get_attribute(selector(do.SetError("EAX"), "box"), "data-text") == "-80"
         page.get_by_role("button", name="Close", exact=True).click()
         assert page.locator(BOX).count() == 0
         # Undo goes to what the server was started with, Redo back again
@@ -191,7 +192,7 @@ def test_interrupted_connection_says_that_all_is_there_and_a_lost_state_that_it_
     with Viewer(load_scene("dvf5000_nominal")) as viewer:
         tab = open_page(viewer, browser)
         page = tab.page
-        tab.send("errors:set.EXX", "7")
+        tab.send(do.SetError("EXX", "7"))
         tab.until(lambda: tab.state.amplitudes["EXX"] == 7.0)
         # viser connects at once while the page is in front: as if it were not
         page.evaluate("document.hasFocus = () => false")
@@ -203,7 +204,8 @@ def test_interrupted_connection_says_that_all_is_there_and_a_lost_state_that_it_
         )
         page.wait_for_selector(f"{BOX}[role=status]")
         tab.until(lambda: "the undo history are unchanged" in page.inner_text(BOX))
-        page.wait_for_selector("[data-box='errors:set.EXX'][data-text='7']", state="attached")
+        box = selector(do.SetError("EXX"), "box")
+        page.wait_for_selector(f"{box}[data-text='7']", state="attached")
         for keys, value in (("Control+z", 0.0), ("Control+Shift+z", 7.0)):
             tab.press(keys)
             tab.until(lambda value=value: tab.state.amplitudes["EXX"] == value)

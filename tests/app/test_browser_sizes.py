@@ -8,6 +8,7 @@ from viser.transforms import SO3
 
 from app.frames import new_visitor
 from app.page_tab import Tab
+from warpspace.app.browser import actions as do
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.state.app_state import start_state
@@ -161,21 +162,21 @@ def test_every_view_looks_along_its_axis_through_both_lenses_with_right_scale_ba
     settled(tab)
     wide = camera.fov
     for view, direction in VIEWS.items():
-        tab.send("controls:view", view)
+        tab.send(do.ViewFrom(view))
         if direction is not None:
             tab.until(partial(looks_along, direction))
         settled(tab)
         bars_agree(tab)
     tab.still(away)  # the page has told the server where its camera has come to stand
     before = size()
-    tab.send("controls:set.lens", 1)
+    tab.send(do.SetOrthographic("1"))
     tab.until(lambda: abs(np.rad2deg(camera.fov) - 3.0) < 1e-6)
     tab.until(lambda: size() == pytest.approx(before, rel=5e-3))
     settled(tab)
     bars_agree(tab)
-    tab.send("controls:set.lens", 0)
+    tab.send(do.SetOrthographic("0"))
     tab.until(lambda: abs(camera.fov - wide) < 1e-6)
-    tab.send("state:set.look.bars", 0)
+    tab.send(do.SetLeaf("look.bars", "0"))
     tab.until(lambda: tab.page.locator("[data-bar-scale]").count() == 0)
 
 
@@ -189,10 +190,10 @@ def test_a_phone_has_the_drawing_on_top_and_the_columns_below(viewer, browser):
     assert within(box, free)
     assert within(found["legend"], found["room"])
     assert "mean 30.9 µm" in phone.part("head").inner_text()
-    for event in (("errors:set.EXX", "1"), ("errors:set.EYY", "1"), ("page:undo",)):
-        phone.send(*event)
+    for action in (do.SetError("EXX", "1"), do.SetError("EYY", "1"), do.Signal.UNDO):
+        phone.send(action)
     for step in ("undo", "redo"):
-        phone.page.wait_for_selector(f"[data-do='page:{step}']")
+        phone.page.wait_for_selector(f"[data-do={step}]")
     for part in ("document.documentElement", "document.querySelector('#ws-top')"):
         assert phone.page.evaluate(f"{part}.scrollWidth") <= PHONE[0]
     phone.page.get_by_role("tab", name="Improve").scroll_into_view_if_needed()

@@ -11,6 +11,7 @@ import pytest
 
 from app.parts import answer_of, lone_part, section
 from still_scenes import still_scene
+from warpspace.app.browser import actions as do
 from warpspace.app.documents.legend import picture_conditions, subject_words
 from warpspace.app.documents.offline_page import build_offline_html
 from warpspace.app.documents.scene_file import state_to_toml
@@ -213,8 +214,8 @@ def test_a_table_is_saved_whole_and_the_box_then_shows_before_and_after(found):
     part, state = asking()
     html = shown(part, state, found)
     assert "SINUMERIK $AN_CEC" in html
-    assert 'data-do="compensate:table"' in html
-    after = part.handle(state, "table", "")
+    assert 'data-do="save_table"' in html
+    after = part.handle(state, do.Signal.SAVE_TABLE)
     assert after.controller is found.controller
     assert after.comparison.b is not None
     ((name, content),) = part.context.told
@@ -223,16 +224,17 @@ def test_a_table_is_saved_whole_and_the_box_then_shows_before_and_after(found):
         f"compensation{add or found.format.endings[0]}" for add in found.files
     ]
     assert improve.packed(found) == (name, content)  # the same table gives the same bytes
-    assert part.handle(after, "box", "machine").controller is None
-    assert part.handle(state, "box", "<b>") == state
-    assert part.handle(state, "set.formats", "<b>").forms["compensate.formats"] == "<b>"
+    assert part.handle(after, do.ShowBox("machine")).controller is None
+    assert part.handle(state, do.ShowBox("<b>")) == state
+    hostile = part.handle(state, do.SetOption("compensate", "formats", "<b>"))
+    assert hostile.forms["compensate.formats"] == "<b>"
 
 
 def test_what_is_left_of_rounding_is_said_and_not_drawn(found):
     # its largest error is below the step that was asked for
     words = shown(*asking(), replace(found, resolution=0.05))
     assert "below the resolution of the file" in words
-    assert 'data-value="residual" title="Residual below numerical resolution"' in words
+    assert 'residual&quot;}" title="Residual below numerical resolution"' in words
     assert "resolution of the file" not in shown(*asking(), found)
 
 

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from app.wire import Wire, dial, end_work
-from warpspace.app.browser.incoming import LONGEST_VALUE, Events
+from warpspace.app.browser import actions as do
+from warpspace.app.browser.incoming import Events
 from warpspace.app.panels.panel import MOST_FILES, Context
 from warpspace.app.server import tab_keeper, viewer
 from warpspace.app.server.viewer import free_port, is_local, page_url, resolve_host
@@ -81,7 +82,7 @@ def test_a_page_says_once_which_tab_it_is():
     token = tab_keeper.new_token()
     with viewer.Viewer(load_scene("dvf5000_nominal")) as running, dial(running) as socket:
         wire = Wire(socket, token)
-        wire.say("tab:here", tab_keeper.new_token())  # only the first counts
+        wire.say(do.TabHere(tab_keeper.new_token()))  # only the first counts
         assert wire.read_until(lambda: wire.is_open, seconds=60.0)
         (session,) = running.sessions
         assert session.token == token
@@ -154,9 +155,9 @@ def test_only_so_many_files_wait_at_once():
     said: list[tuple[str, ...]] = []
     context.events, context._wake = deque(), threading.Event()
     context.notify = lambda *words: said.append(words)
-    file = Events([("files:file", "x" * (LONGEST_VALUE + 1))])
+    file = Events([do.Upload("files", "x", 9, "x")])
     for _ in range(MOST_FILES + 3):
         context.receive(file)
-        context.receive(Events([("errors:set.EXX", "1")]))
+        context.receive(Events([do.SetError("EXX", "1")]))
     assert len(context.events) == 2 * MOST_FILES + 3
     assert "at once" in said[0][1]

@@ -7,6 +7,7 @@ import pytest
 
 from app.parts import lone_part
 from warpspace.analysis.commands.adjust import apply_adjustments
+from warpspace.app.browser import actions as do
 from warpspace.app.documents.legend import order_conditions, picture_conditions, subject_words
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.live_model import LiveModel
@@ -48,18 +49,19 @@ def test_the_section_offers_what_is_in_force_and_holds_the_point_that_is_picked(
     text = section.body(LIVE.evaluate(START))
     assert 'value="component_errors=after_motion" checked' in text
     assert "before motion" in text
-    state = section.handle(START, "choose", "reference=point")
-    state = section.handle(state, "set.reference", "X 100,5 mm")
+    state = section.handle(START, do.Input.CHOOSE_CONVENTION("reference=point"))
+    state = section.handle(state, do.Input.SET_REFERENCE("X 100,5 mm"))
     assert state.scene.reference["X"] == 100.5
     assert 'value="X 100.5 Y ' in section.body(LIVE.evaluate(state))
-    assert "expected axis positions" in section.handle(state, "set.reference", "<b>").notes[-1]
+    refused = section.handle(state, do.Input.SET_REFERENCE("<b>"))
+    assert "expected axis positions" in refused.notes[-1]
     clicked = replace(state, picked=Picked({"X": 0.0, "Y": 10.0, "Z": -280.0}))
-    assert section.handle(clicked, "pick", "").scene.reference == clicked.picked.at
+    state_there = section.handle(clicked, do.Signal.USE_PICKED_REFERENCE)
+    assert state_there.scene.reference == clicked.picked.at
     assert "disabled" in section.body(LIVE.evaluate(state))
-    assert section.handle(state, "own", "").scene is START.scene
-    assert section.handle(START, "set.Q", "<b>") is START
+    assert section.handle(state, do.Signal.RESET_CONVENTIONS).scene is START.scene
     for word in ("", "direction Q=1", "direction C=2", "reference=<b>", "x" * 500):
-        assert section.handle(START, "choose", word) is START
+        assert section.handle(START, do.Input.CHOOSE_CONVENTION(word)) is START
 
 
 def test_a_reference_is_held_still_clamped_and_taken_back():

@@ -10,6 +10,7 @@ from app.parts import answer_of, lone_part, section, wait
 from warpspace import load_scene
 from warpspace.analysis.commands.adjust import Adjust
 from warpspace.analysis.commands.concepts import Concepts, compare_concepts
+from warpspace.app.browser import actions as do
 from warpspace.app.documents.output_services import Services
 from warpspace.app.panels import design
 from warpspace.app.panels.improve import AdjustPanel
@@ -29,7 +30,7 @@ KEYS = ("EXX", "EYX", "EA0Z")
 
 
 def ran(part, state):
-    part.handle(state, "run", "")
+    part.handle(state, do.Run(part.name))
     wait(part)
     return part
 
@@ -46,14 +47,14 @@ def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
     assert [one.adjust for one in found.adjustments] == [one.adjust for one in said.adjustments]
     assert part.offered_changes(found) == [0, 1]  # of sets of one, two and three
     shown = section(part, state)
-    assert shown.count("adjust:apply") == 2
+    assert shown.count("&quot;Apply&quot;") == 2
     assert re.search(r"<b>EC0Y 23\.1 → [\d.]+ µrad</b>.*max</th><td>51\.7 → ", shown)
-    applied = part.handle(state, "apply", "1")
+    applied = part.handle(state, do.Apply("adjust", 1))
     assert applied.comparison.a.title == "before adjustment"
     ran(part, applied)
     assert "reduces the error by 1 % or more" in section(part, applied)
-    for index in ("9", "-1", "²", ""):
-        assert part.handle(applied, "apply", index) is applied
+    assert part.handle(applied, do.Apply("adjust", 9)) is applied
+    assert part.handle(state, do.Apply("best", 1)) is state
 
 
 # --- Tolerances -----------------------------------------------------------------------------------
@@ -121,16 +122,16 @@ def test_tolerances_are_typed_fixed_scaled_and_reset():
     part = lone_part(design.TolerancesPanel, "allocate")
     section(part, START)  # lays out the rows
     state = put(START, "specification.fixed", "+EXX")
-    assert 'data-value="-EXX"' in section(part, state)
+    assert "-EXX&quot;" in section(part, state)
     state = put(state, "tolerances.EYX", "0")
-    scaled = part.handle(state, "scale", "× 1.5")
+    scaled = part.handle(state, do.Input.SCALE_TOLERANCES("× 1.5"))
     assert [edits.half_width_of(scaled, key) for key in KEYS] == [10.0, 0.0, 37.5]
     for _ in range(20):
-        scaled = part.handle(scaled, "scale", "× 1.5")
+        scaled = part.handle(scaled, do.Input.SCALE_TOLERANCES("× 1.5"))
     assert edits.half_width_of(scaled, "EA0Z") == 1000.0
-    assert part.handle(scaled, "reset", "").tolerances == FIRST.tolerances
-    for word, value in (("scale", "1e9"), ("set.x", "3")):
-        assert part.handle(START, word, value) is START
+    assert part.handle(scaled, do.Signal.RESET_TOLERANCES).tolerances == FIRST.tolerances
+    for action in (do.Input.SCALE_TOLERANCES("1e9"), do.SetOption("allocate", "x", "3")):
+        assert part.handle(START, action) is START
 
 
 # --- Machines side by side ------------------------------------------------------------------------
@@ -147,8 +148,9 @@ def test_machines_are_compared_as_the_command_does_and_drawn():
     part = concepts_part()
     part.context.services = Services(draw_concepts=lambda scenes, *_: asked.append(scenes) or b"")
     key = next(key for key, scene in part.offers(START).items() if scene == OTHER)
-    assert part.handle(START, "run", "") is START  # one machine alone is not compared
-    chosen = part.handle(part.handle(START, "set.add", key), "set.add", key)
+    assert part.handle(START, do.Run("concepts")) is START  # one machine alone is not compared
+    add = do.Input.ADD_CONCEPT(key)
+    chosen = part.handle(part.handle(START, add), add)
     assert part.chosen(chosen) == [design.PRESENT, key]
     ran(part, chosen)
     found = part.outcome.result
@@ -156,13 +158,13 @@ def test_machines_are_compared_as_the_command_does_and_drawn():
     expected = compare_concepts([FIRST, OTHER], plan)
     assert [one.json_fields for one in found.concepts] == [one.json_fields for one in expected]
     assert "largest contributions share of the variance" in section(part, chosen)
-    part.handle(chosen, "sheet", "")
+    part.handle(chosen, do.Signal.DRAW_CONCEPTS)
     wait(part)
     assert [one.title for one in asked[0]] == [FIRST.title, OTHER.title]
     assert ("concepts.png", b"") in part.context.told
-    assert part.chosen(part.handle(chosen, "remove", design.PRESENT)) == [key]
-    for word in ("set.add", "remove", "open"):
-        assert part.handle(chosen, word, "none of them") == chosen
+    assert part.chosen(part.handle(chosen, do.Input.REMOVE_CONCEPT(design.PRESENT))) == [key]
+    for kind in (do.Input.ADD_CONCEPT, do.Input.REMOVE_CONCEPT, do.Input.OPEN_CONCEPT):
+        assert part.handle(chosen, kind("none of them")) == chosen
 
 
 def test_titles_of_machines_are_escaped_and_there_is_a_most():

@@ -181,7 +181,7 @@ def test_names_from_a_browser_are_made_safe(safe, given, kept):
 
 def test_uploads_that_are_no_scene_are_refused_with_every_problem():
     with pytest.raises(OptionError, match="at most 4 MB"):
-        transfers.read_upload(upload("big.toml", b"x" * (4 * 2**20 + 1))[1])
+        transfers.read_upload(upload("big.toml", b"x" * (4 * 2**20 + 1)))
     with pytest.raises(OptionError, match="not UTF-8"):
         transfers.upload_text(b"\xff\xfe\x00", "x.toml")
     with pytest.raises(SceneError) as caught:

@@ -19,6 +19,7 @@ from app.wire import dial
 from page_client import pack, said
 from reliability import doors
 from reliability.doors import GUESSES, HOSTS, ORIGINS, PATHS, TOKEN, UPGRADE
+from warpspace.app.browser import actions as do
 from warpspace.app.server import connection_guard, viewer
 from warpspace.app.server.connection_guard import Limits, Rate
 from warpspace.app.server.request_policy import Access, HostPort, RequestPolicy, read_place
@@ -265,7 +266,7 @@ def test_sessions_are_limited(limited, caplog):
 
 
 def test_the_rate_of_messages_is_limited(limited, caplog):
-    message, rate = pack(said(("nobody:none", ""))), {"messages_per_second": 0.001, "burst": 20}
+    message, rate = pack(said(do.Run("nobody"))), {"messages_per_second": 0.001, "burst": 20}
     with limited(**rate) as running, dial(running) as honest, dial(running) as flood:
         for _ in range(20):
             honest.send(message)

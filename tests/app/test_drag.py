@@ -7,6 +7,7 @@ import pytest
 
 from app.parts import LIVE
 from app.wire import opened
+from warpspace.app.browser import actions as do
 from warpspace.app.documents import legend
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.live_model import DrawnScale
@@ -19,16 +20,16 @@ FIRST = load_scene("dvf5000_first")
 START = start_state(FIRST, nodes=5)
 
 
-def drag(wire, name, *values):
-    wire.say("tab:hold")
+def drag(wire, key, *values):
+    wire.say(do.Signal.HOLD)
     for value in values:
-        wire.say(name, value)
+        wire.say(do.SetError(key, value))
 
 
 def test_a_drag_keeps_exaggeration_and_colours_until_its_end():
     with opened(FIRST) as (wire, session):
         before = session.context.picture
-        drag(wire, "errors:set.EA0Z", "200", "400")
+        drag(wire, "EA0Z", "200", "400")
         assert wire.read_until(lambda: session.context.picture.state.amplitudes["EA0Z"] == 400.0)
         held = session.context.picture
         assert held.exaggeration == before.exaggeration
@@ -37,7 +38,7 @@ def test_a_drag_keeps_exaggeration_and_colours_until_its_end():
         assert np.abs(held.drawn_mm - before.drawn_mm).max() > 100.0  # the increase is drawn
         end = f"&gt; {before.scale.high:g}<"
         assert wire.read_until(lambda: end in wire.pieces["legend"])
-        wire.say("tab:release")
+        wire.say(do.Signal.RELEASE)
         assert wire.read_until(lambda: session.context.picture.exaggeration < held.exaggeration)
         after = session.context.picture
         chosen = LIVE.evaluate(session.state)
@@ -47,7 +48,7 @@ def test_a_drag_keeps_exaggeration_and_colours_until_its_end():
 
 def test_a_typed_number_rescales_at_once():
     with opened(FIRST) as (wire, session):
-        wire.say("errors:set.EA0Z", "400")
+        wire.say(do.SetError("EA0Z", "400"))
         assert wire.read_until(lambda: session.context.picture.state.amplitudes["EA0Z"] == 400.0)
         assert session.context.picture.exaggeration == LIVE.evaluate(session.state).exaggeration
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from warpspace import load_scene
+from warpspace.app.browser.actions import EditCurve
 from warpspace.app.panels.error_list import edit_curve, kind_titles, read_curve, spell_rows
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import Exclusions, start_state
@@ -137,14 +138,16 @@ def test_refused_with_a_message(kind, text, message):
 @pytest.mark.parametrize("kind", kind_titles())
 @pytest.mark.parametrize("function", EXAMPLES, ids=lambda function: function.title)
 def test_another_kind_starts_from_the_present_curve(function, kind):
-    state, said = edit_curve(edits.with_curve(START, "EXX", function), "kind", "EXX", kind)
+    state, said = edit_curve(
+        edits.with_curve(START, "EXX", function), EditCurve("EXX", "kind", kind)
+    )
     converted = state.curve("EXX")
     assert (converted.title, said) == (kind, None)
     if kind in {"constant", "ramp", "harmonics"}:
         assert converted.amplitude == pytest.approx(function.amplitude, rel=1e-6)
     # what the editor would show is what it would read
     assert read(kind, spell_rows(converted)) is not None
-    assert "expected one of" in edit_curve(state, "kind", "EXX", "none such")[1].message
+    assert "expected one of" in edit_curve(state, EditCurve("EXX", "kind", "none such"))[1].message
 
 
 def test_long_tables_are_thinned_out_for_editing():

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from app.wire import opened
 from reliability.failing import ERRORS, STAGES, WAYS, Review, reviewed
+from warpspace.app.browser import actions as do
 from warpspace.app.evaluation import live_picture
 from warpspace.app.evaluation.live_model import DrawnScale, LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -53,12 +54,12 @@ def test_a_panel_that_fails_whatever_is_shown_does_not_hold_the_state(
     with opened(load_scene("dvf5000_first")) as (wire, session):
         monkeypatch.setattr(STAGES["conditions"][0], "render", fail)
         for value in ("3", "4"):
-            wire.say("errors:set.EXX", value)
+            wire.say(do.SetError("EXX", value))
             assert wire.read_until(
                 lambda: session.display.scheduler.due_in_s is None and any(wire.toasts)
             )
             wire.toasts.clear()
-        wire.say("errors:set.EXX", "5")
+        wire.say(do.SetError("EXX", "5"))
         assert wire.read_until(lambda: any(wire.toasts))
         assert wire.toasts[0][1] == "The action failed"
         assert session.state.amplitudes["EXX"] == 5.0
@@ -79,7 +80,7 @@ def test_a_scene_whose_part_cannot_be_evaluated_opens_without_it(
     with opened(load_scene("part_on_dvf5000")) as (wire, session):
         assert wire.read_until(lambda: bool(wire.toasts))
         assert "OverflowError: too large" in wire.toasts[0][2]
-        wire.say("errors:set.EXX", "3")
+        wire.say(do.SetError("EXX", "3"))
         assert wire.read_until(lambda: 'data-text="3"' in wire.pieces["error.EXX"])
         assert session.state.part.mesh is None
 
@@ -106,9 +107,9 @@ def test_a_story_whose_step_cannot_be_evaluated_ends(monkeypatch: pytest.MonkeyP
     with opened(load_scene("review_dvf5000")) as (wire, session):
         before = session.state
         is_told.append(True)
-        wire.say("story:start")
+        wire.say(do.Signal.START_STORY)
         assert wire.read_until(lambda: bool(wire.toasts))
         is_told.clear()
-        wire.say("errors:set.EXX", "3")
+        wire.say(do.SetError("EXX", "3"))
         assert wire.read_until(lambda: 'data-text="3"' in wire.pieces["error.EXX"])
         assert session.state.amplitudes == {**before.amplitudes, "EXX": 3.0}

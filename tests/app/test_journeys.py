@@ -8,7 +8,9 @@ from PIL import Image
 
 from app.frames import draw
 from app.page_tab import SCENES
+from page_client import selector
 from warpspace.analysis.commands.adjust import Adjust
+from warpspace.app.browser import actions as do
 from warpspace.app.state.app_state import start_state
 from warpspace.scene.library import parse_scene
 
@@ -116,7 +118,7 @@ def test_two_machines_are_compared_with_a_picture_in_three_actions(tab, renderer
 
 @pytest.mark.daily
 def test_the_slider_that_is_held_keeps_the_scales_until_it_is_released(tab):
-    bar = tab.page.locator("input[type=range][data-set='errors:set.EA0Z']")
+    bar = tab.page.locator(f"input[type=range]{selector(do.SetError('EA0Z'), 'set')}")
     box, mouse = bar.bounding_box(), tab.page.mouse
     before = tab.session.context.picture
 
@@ -138,9 +140,9 @@ def test_the_slider_that_is_held_keeps_the_scales_until_it_is_released(tab):
 
 
 def test_a_drag_ends_where_the_hand_stopped_and_digits_set_a_number(tab):
-    slider = tab.page.locator("input[type=range][data-set='errors:set.EA0Z']")
-    drag = "for (let i = 0; i < 40; i++) warpspacePage.send('errors:set.EA0Z', 33.9 - i);"
-    tab.page.evaluate(f"() => {{ {drag} }}")
+    slider = tab.page.locator(f"input[type=range]{selector(do.SetError('EA0Z'), 'set')}")
+    drag = "for (let i = 0; i < 40; i++) warpspacePage.send(action, 33.9 - i);"
+    tab.page.evaluate(f"action => {{ {drag} }}", str(do.SetError("EA0Z")))
     wanted = replace(tab.state, amplitudes={**tab.state.amplitudes, "EA0Z": -5.1})
     tab.until(lambda: tab.state.amplitudes["EA0Z"] == pytest.approx(-5.1))
     tab.until(lambda: tab.shows_state(wanted))
@@ -171,7 +173,7 @@ def test_a_distance_is_measured_between_two_clicks_and_stands_in_the_drawing(tab
     assert tab.state.picked is None
     tab.click("Pin")  # a note is begun with the numbers
     tab.until(lambda: "Δx" in tab.page.locator("textarea").first.input_value())
-    tab.send("distance:clear")
+    tab.send(do.Signal.CLEAR_POINTS)
     tab.until(lambda: tab.page.locator(".ws-words span", has_text="Δx").count() == 0)
 
 
@@ -197,17 +199,17 @@ def test_a_click_asks_why_and_a_saved_scene_holds_what_was_changed(tab):
     tab.page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
     tab.until(lambda: tab.state.picked is not None)
     tab.says("This point")
-    tab.send("errors:set.EXX", "3.25")
+    tab.send(do.SetError("EXX", "3.25"))
     tab.until(lambda: tab.state.amplitudes["EXX"] == 3.25)
     with tab.page.expect_download() as saved:
         tab.press("Control+s")
     text = saved.value.path().read_text("utf-8")
     assert parse_scene(text, "saved", "saved").errors.amplitude("EXX") == 3.25
     with tab.page.expect_download(timeout=60_000) as saved:
-        tab.send("files:view")
+        tab.send(do.Signal.SAVE_VIEW)
     about = Image.open(BytesIO(saved.value.path().read_bytes())).info
     assert about["Title"] == tab.state.scene.title
-    tab.send("page:reset")
+    tab.send(do.Signal.RESET_ERRORS)
     tab.until(lambda: tab.state.amplitudes["EXX"] == 0.0)
     tab.give("mine.toml", text.encode(), tab.page.get_by_role("button", name="Open").first.click)
     tab.until(lambda: tab.state.amplitudes["EXX"] == 3.25 and tab.state.picked is not None)
@@ -216,7 +218,7 @@ def test_a_click_asks_why_and_a_saved_scene_holds_what_was_changed(tab):
 def typed_on(tab, key, text):
     """Type a number while the slider of an error has the focus: one action."""
     tab.actions += 1
-    tab.page.locator(f"input[type=range][data-set='errors:set.{key}']").focus()
+    tab.page.locator(f"input[type=range]{selector(do.SetError(key), 'set')}").focus()
     tab.page.keyboard.type(text)
     tab.page.keyboard.press("Enter")
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from warpspace.app.drawing.around import arrows
 from warpspace.app.drawing.box import LIMIT_NODES, BoxLayer, limit_shapes
-from warpspace.app.drawing.camera import VIEWS, clipping, fit_camera, read_room
+from warpspace.app.drawing.camera import VIEWS, clipping, fit_camera
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation import machine_bodies
 from warpspace.app.evaluation.cache import Cache
@@ -175,13 +175,6 @@ def test_arrows_run_from_foot_to_tip_and_shrink_to_a_point():
     assert back[:, 0] == pytest.approx(np.hypot(10.0, 3.0))
     assert (back[:, 1] < length[1]).all()
     assert (found[:, 2] == 0.0).all()
-
-
-def test_a_room_that_cannot_be_is_none():
-    texts = (
-        " 1,2,3 1,900,700,80,50,-5 1,nan,700,80,50,90 1,50,700,80,50,90 1,9e9,7,8,5,90 ²,9,9,9,9,9"
-    )
-    assert {*map(read_room, texts.split(" "))} == {None}
 
 
 def test_labels_of_isolines_stand_on_lines_of_their_value():

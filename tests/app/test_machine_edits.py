@@ -11,6 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.parts import LIVE, body_of, lone_part
+from warpspace.app.browser import actions as do
+from warpspace.app.browser.html import attributes
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.machine_edits import (
     edited,
@@ -134,7 +136,7 @@ def test_every_machine_of_the_library_starts_with_its_own_scene(state):
     state = state.with_amplitude("EAX", 33.0)
     window = lone_part(machine_editor.MachinesDialog)
     for name, scene in library().items():
-        changed = window.handle(state, "choose", name)
+        changed = window.handle(state, do.Input.CHOOSE_MACHINE(name))
         if name == state.scene.machine.name:  # as it was opened, with all that has been entered
             assert changed == state
             continue
@@ -173,12 +175,12 @@ def test_what_stands_somewhere_stays_within_the_ranges_of_another_machine(state)
 
 def test_a_chain_that_is_refused_stays_in_its_box_with_the_reason(state):
     editor = lone_part(machine_editor.EditorSection)
-    assert editor.handle(state, "set.chain", "wC<script>") is state
+    assert editor.handle(state, do.EditMachine("chain", "wC<script>")) is state
     text = editor.body(LIVE.evaluate(state))
     assert 'value="wC&lt;script&gt;"' in text
     assert "cannot be read" in text
     assert "<script>" not in text
-    moved = editor.handle(state, "set.offset X 0", "12,5")
+    moved = editor.handle(state, do.EditMachine("offset X 0", "12,5"))
     assert moved.scene.machine.axes["X"].offset_mm[0] == 12.5
     assert "cannot be read" not in editor.body(LIVE.evaluate(moved))
 
@@ -276,11 +278,13 @@ def test_a_table_that_is_paused_can_stand_there_and_axes_be_held_at_quarters():
     state = replace(STATE, page=replace(STATE.page, task="machine", open=frozenset({"rotary"})))
     section.context.stage = SimpleNamespace(playing=False, position={"C": 89.7}, followers={})
     text = section.body(LIVE.evaluate(state))
-    assert 'data-do="state:set.positions.C" data-value="90"' in text
-    assert 'data-do="state:set.rotary.held.C" data-value="0,90,180,270"' in text
-    assert 'data-do="state:set.rotary.off" data-value="+1"' in text
+    for action in (
+        do.SetLeaf("positions.C", "90"), do.SetLeaf("rotary.held.C", "0,90,180,270"),
+        do.SetLeaf("rotary.off", "+1"),
+    ):  # fmt: skip
+        assert attributes(data_do=action) in text
     section.context.stage.position = {"B": -25.0}  # another axis was moved by hand
-    assert "state:set.positions.C" not in section.body(LIVE.evaluate(state))
+    assert "positions.C" not in section.body(LIVE.evaluate(state))
 
 
 # --- A scene alone -------------------------------------------------------------------------------

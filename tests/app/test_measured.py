@@ -10,6 +10,7 @@ import pytest
 from app.hostile import upload
 from app.parts import Alone
 from warpspace.analysis.registry import entries
+from warpspace.app.browser import actions as do
 from warpspace.app.documents.scene_file import settings_line, with_settings
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.live_model import LiveModel
@@ -42,16 +43,16 @@ class Column(Alone):
 
     state = property(lambda self: self.store.state)
 
-    def do(self, word, value=""):
-        super().do(word, value)
+    def do(self, action):
+        super().do(action)
         return self.html
 
     def give(self, name, content):
         """Send a file."""
-        self.do(*(word.removeprefix("files:") for word in upload(name, content)))
+        self.do(upload(name, content, self.part.name))
 
     def run(self):
-        self.do("run")
+        self.do(do.Run(self.part.name))
         return self.settle()
 
     def settle(self):
@@ -86,7 +87,7 @@ def positioned(targets):
 def test_figure_and_path_follow_the_errors(name):
     column = Column(measurement.TestsPanel, STATE)
     depends = column.part.dependencies(LIVE.evaluate(column.state))
-    column.do("choose", name)
+    column.do(do.Input.CHOOSE_TEST(name))
     assert column.part.dependencies(LIVE.evaluate(column.state)) != depends
     html = column.settle()
     result = column.part.outcome.result
@@ -99,7 +100,7 @@ def test_figure_and_path_follow_the_errors(name):
     assert moved.nominal_mm is found.nominal_mm
     assert np.abs(moved.error_um - found.error_um).max() > 1.0
     np.testing.assert_allclose(moved.drawn_mm(1e3) - moved.nominal_mm, moved.error_um, atol=1e-9)
-    column.do("path", "0")
+    column.do(do.SetOption("test", "path", "0"))
     assert LIVE.evaluate(column.state).bench is None
 
 
@@ -114,10 +115,10 @@ def test_figure_and_path_follow_the_errors(name):
 )
 def test_what_cannot_be_run_is_said_in_its_place(name, options, message):
     column = Column(measurement.TestsPanel, STATE)
-    column.do("choose", name)
+    column.do(do.Input.CHOOSE_TEST(name))
     column.settle()
     for option, text in options.items():
-        column.do(f"set.{option}", text)
+        column.do(do.SetOption("test", option, text))
     html = column.settle()
     assert message in unescape(html)
     assert "ws-problem" in html
@@ -132,24 +133,24 @@ def test_a_test_runs_where_the_tables_stand_or_says_why_it_cannot():
     column = Column(
         measurement.TestsPanel, start_state(load_scene("machine_c_frame_mill"), nodes=3)
     )
-    column.do("choose", "r-test")
+    column.do(do.Input.CHOOSE_TEST("r-test"))
     assert "no rotary axis" in column.settle()
 
 
 def test_measured_readings_stand_beside_the_model_and_go_into_the_report():
     column = Column(measurement.TestsPanel, STATE)
-    column.do("choose", "positioning")
-    column.do("choose", HOSTILE)
-    column.do("set.nothing", HOSTILE)
+    column.do(do.Input.CHOOSE_TEST("positioning"))
+    column.do(do.Input.CHOOSE_TEST(HOSTILE))
+    column.do(do.SetOption("test", "nothing", HOSTILE))
     assert column.state.forms == {"test": "positioning"}
     column.give(f"../{HOSTILE}.csv", positioned(range(-250, 251, 50)))
     html = column.settle()
     assert "RMS of measured − model" in html
     assert "<img" not in html
-    column.do("report")
+    column.do(do.AddToReport("test"))
     ((_, result),) = column.context.report_results
     assert result.rms_difference > 0.1
-    column.do("remove", "0")
+    column.do(do.RemoveFile(column.part.name, 0))
     assert "RMS of measured" not in column.settle()
     column.give("x.csv", b"a,b\n1,2\n")
     assert "ws-problem" in column.settle()
@@ -177,7 +178,7 @@ def test_what_forms_were_told_is_linked_and_kept_and_what_is_compared_runs_the_s
 @pytest.fixture(scope="module")
 def fitted():
     column = calibrate()
-    column.do("bundled", "tcp_on.csv")
+    column.do(do.Input.ADD_READINGS("tcp_on.csv"))
     return column, column.run()
 
 
@@ -199,7 +200,7 @@ def test_an_applied_fit_gives_errors_that_had_no_row_and_one_undo_takes_it_back(
     state = column.state
     (found,) = [one for one in column.part.outcome.result.parameters if one.key == "EB0B"]
     store = StateStore(state)
-    store.apply(lambda now: column.part.handle(now, "apply", "0"))
+    store.apply(lambda now: column.part.handle(now, do.Apply("calibrate", 0)))
     assert store.state.amplitudes["EB0B"] == round(found.value, 3) != 0.0
     compared = LIVE.evaluate(store.state).compared
     assert compared.a.max_um == 0.0
@@ -215,21 +216,22 @@ def test_a_page_gives_only_known_words_and_small_readable_files():
     assert "b.csv: is empty" in column.html
     receive("utf16.csv", BUNDLED.decode().encode("utf-16"))
     assert [file.name for file in column.part.files] == ["utf16.csv"]
-    column.do("remove", "0")
+    column.do(do.RemoveFile(column.part.name, 0))
     receive("../../etc/passwd", b"x" * (2 * 2**20 + 1))
     assert "2.0 MB" in column.html
-    assert "9.5 MB" in column.do("file", f"10000000\n{HOSTILE}\n")
+    assert "9.5 MB" in column.do(do.Upload("calibrate", HOSTILE, 10_000_000, ""))
     receive("../../tcp<b>.csv", BUNDLED)
     assert [one.name for one in column.part.files] == ["tcp_b.csv"]
-    for word, value in (
-        ("remove", "9"), ("remove", "-1"), ("remove", ""), ("bundled", "../tcp_on.csv"),
-        ("bundled", HOSTILE), ("kind", HOSTILE), ("arrows", HOSTILE), ("x" * 100, ""),
-        ("file", ""), ("preview", "0"), ("test-options", HOSTILE),
+    for action in (
+        do.RemoveFile("calibrate", 9), do.RemoveFile("part", 0), do.Upload("calibrate", "", 0, "²"),
+        do.Preview("calibrate", 0), do.Input.ADD_READINGS("../tcp_on.csv"),
+        do.Input.ADD_READINGS(HOSTILE), do.Input.SET_READING_KIND(HOSTILE),
+        do.Input.SHOW_RESIDUALS(HOSTILE), do.Input.SET_TEST_OPTIONS(HOSTILE),
     ):  # fmt: skip
-        assert "<img" not in column.do(word, value)
+        assert "<img" not in column.do(action)
     assert len(column.part.files) == 1
     assert column.state.comparison.b is None
-    assert "tcp_b.csv" not in column.do("remove", "0")
+    assert "tcp_b.csv" not in column.do(do.RemoveFile(column.part.name, 0))
 
 
 def test_nothing_of_a_browser_becomes_a_path(tmp_path, monkeypatch):
@@ -241,8 +243,8 @@ def test_nothing_of_a_browser_becomes_a_path(tmp_path, monkeypatch):
             measurement.read_uploaded(SCENE, "", str(secret), kind, ())
     column = calibrate()
     for name in (str(secret), "secret.csv", "../secret.csv"):
-        column.do("bundled", name)
-        column.do("set.data", name)
+        column.do(do.Input.ADD_READINGS(name))
+        column.do(do.SetOption("calibrate", "data", name))
     assert column.part.files == ()
     assert "data" not in column.part.values(column.state)
 
@@ -263,7 +265,7 @@ def test_files_have_names_of_their_own_and_are_few():
 def test_bad_parameters_and_hostile_sessions_are_said_escaped(keys):
     column = calibrate()
     column.give("x.csv", BUNDLED.replace(b"c1", b"<img src=x>"))
-    column.do("set.fit", keys)
+    column.do(do.SetOption("calibrate", "fit", keys))
     column.part.problem = None
     html = column.run()
     assert "ws-problem" in html
@@ -272,10 +274,10 @@ def test_bad_parameters_and_hostile_sessions_are_said_escaped(keys):
 
 def test_readings_of_a_standard_test_come_with_its_options():
     column = calibrate()
-    column.do("kind", "positioning")
-    column.do("test-options", "axis=X")
+    column.do(do.Input.SET_READING_KIND("positioning"))
+    column.do(do.Input.SET_TEST_OPTIONS("axis=X"))
     column.give("x.csv", positioned(range(150, 551, 50)))
-    column.do("set.fit", "EXX")
+    column.do(do.SetOption("calibrate", "fit", "EXX"))
     column.run()
     found = column.part.outcome.result
     assert found.rms_after_mm < 1e-9 < found.rms_before_mm
@@ -295,9 +297,9 @@ def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
     assert "The import adds EXX." in html
     before = LIVE.evaluate(STATE).statistics
     assert f"{before.mean_um:.1f} → " in html
-    Alone.do(column, "apply", "0")
+    Alone.do(column, do.Apply("import", 0))
     applied = column.state
-    Alone.do(column, "apply", "0")  # a second click, before the page is drawn anew
+    Alone.do(column, do.Apply("import", 0))  # a second click, before the page is drawn anew
     assert column.state is applied  # once: the answer is of the state before
     after = LIVE.evaluate(replace(applied, comparison=STATE.comparison)).statistics
     assert after.mean_um != pytest.approx(before.mean_um)
@@ -327,23 +329,23 @@ def test_a_file_that_does_not_say_its_axis_or_format_asks_in_the_words_of_the_pa
     assert 'role="alert"' in html
     assert 'class="ws-options" open' in html
     assert "--axis" not in html
-    column.do("apply", "0")
+    column.do(do.Apply("import", 0))
     assert column.state.comparison.b is None
-    column.do("set.axis", HOSTILE * 100_000)
+    column.do(do.SetOption("import", "axis", HOSTILE * 100_000))
     assert "<img" not in column.settle()
     assert len(column.part.problem[1]) <= 1500
-    column.do("remove", "0")
+    column.do(do.RemoveFile(column.part.name, 0))
     column.part.parse("data.dat", b"0\t0.001\t0.002\n")()
     assert "matches no known format" in column.settle()
-    for word, value, said in (
-        ("set.format", "linuxcnc-comp", "its axis"),
-        ("set.axis", "X", "The import adds EXX."),
-        ("set.format", "heidenhain", "data.dat: "),
-        ("set.format", HOSTILE, "expected one of"),
+    for option, value, said in (
+        ("format", "linuxcnc-comp", "its axis"),
+        ("axis", "X", "The import adds EXX."),
+        ("format", "heidenhain", "data.dat: "),
+        ("format", HOSTILE, "expected one of"),
     ):
-        column.do(word, value)
+        column.do(do.SetOption("import", option, value))
         assert said in column.settle()
-    column.do("remove", "0")
+    column.do(do.RemoveFile(column.part.name, 0))
     assert "Files can also be dropped" in column.html
     with pytest.raises(SceneError):
         column.part.parse("nothing.bin", b"\0\1\2")()

@@ -6,17 +6,19 @@ import re
 import threading
 import time
 from types import SimpleNamespace
+from typing import get_args
 
 import psutil
 import pytest
 from viser import _messages as messages
 
-from app.hostile import camera, events, nonsense, upload
+from app.hostile import actions, camera, nonsense, upload
 from app.wire import Wire, opened
 from app.wire import dial as dial_viewer
 from page_client import CAMERA, App, dial, pack, said, until
 from reliability.outcome import Lag
-from warpspace.app.browser.incoming import MOST_EVENTS, Event, event_of, read_message
+from warpspace.app.browser import actions as do
+from warpspace.app.browser.incoming import MOST_EVENTS, read_message
 from warpspace.app.browser.page import Page
 from warpspace.app.browser.viser_private import connection_of, message_buffer, send_at_once
 from warpspace.app.server import session
@@ -25,6 +27,8 @@ from warpspace.app.server.session import turn
 from warpspace.app.server.viewer import RepeatedLines, Viewer
 from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
+
+PANEL_KINDS = {*do.PanelAction.__subclasses__()}
 
 
 @pytest.fixture(scope="module")
@@ -94,15 +98,13 @@ def test_what_a_page_really_says_passes():
         {"type": "TransformControlsUpdateMessage", "name": "/part/gizmo", "wxyz": [1, 0, 0, 0],
          "position": [1, 2, 3.5], "owner": ""},
         {"type": "TransformControlsDragEndMessage", "name": "/part/gizmo", "owner": ""},
-        said(("a:b", ""), ("errors:find", "x")),
+        said(do.Signal.UNDO, do.Input.FIND_ERRORS("x")),
         said(upload("x.csv", b"1" * 100_000)),
     ):  # fmt: skip
         assert read_message(pack(message)) is not None, message
-    found = read_message(pack(said(("state:set.a:1", "x"), ("page:undo", ""))))
-    assert [event_of(*one) for one in found.events] == [
-        Event("state", "set.a:1", "x"),
-        Event("page", "undo", ""),
-    ]
+    sent = [do.SetLeaf("look.surface", "x"), do.Signal.UNDO, do.Input.EXPORT(".stl")]
+    assert read_message(pack(said(*sent))).events == sent
+    assert all(read_message(pack(said(action))) is not None for action in actions())
 
 
 def test_what_makes_no_sense_does_not_pass():
@@ -116,20 +118,35 @@ def test_only_what_viser_is_to_know_reaches_it(monkeypatch):
     monkeypatch.setattr(messages.Message, "deserialize", lambda raw: seen.append(raw) or read(raw))
     with opened(load_scene("dvf5000_nominal")) as (wire, session):
         seen.clear()
-        for message in (*nonsense(), pack(said(("errors:set.EXX", "7"))), camera(fov=0.5)):
+        for message in (*nonsense(), pack(said(do.SetError("EXX", "7"))), camera(fov=0.5)):
             wire.socket.send(message)
         assert wire.read_until(lambda: session.state.amplitudes["EXX"] == 7.0)
         assert wire.read_until(lambda: bool(seen))
     assert seen == [camera(fov=0.5)]
 
 
-def test_events_that_no_page_sends_are_refused_in_words_and_the_page_goes_on(caplog):
+def test_every_action_is_decoded_and_handled_by_one_panel_or_by_the_session():
+    with opened(load_scene("dvf5000_first"), services=build_services(), shared=True) as (
+        _,
+        session,
+    ):
+        panels = session.display.panels.values()
+        handled = [kind for panel in panels for kind in {*panel.handlers} - PANEL_KINDS]
+        in_page = {do.Signal.FIND_ERROR, do.Signal.CHOOSE_FILES, do.Signal.DRAWN, do.TabHere}
+        kinds = {*do.Signal, *do.Input, *get_args(do.AnyAction)} - {do.Signal, do.InputValue}
+        assert len(handled) == len({*handled})
+        assert {*handled} == kinds - PANEL_KINDS - in_page
+        assert {kind for panel in panels for kind in panel.handlers} >= PANEL_KINDS
+
+
+def test_actions_without_meaning_are_refused_in_words_and_the_page_goes_on(caplog):
     with opened(load_scene("dvf5000_first"), services=build_services()) as (wire, session):
-        sent = events(sorted(session.display.panels))
+        sent = actions()
         for at in range(0, len(sent), MOST_EVENTS):
             wire.send(said(*sent[at : at + MOST_EVENTS]))
             time.sleep(0.01)  # no faster than a page may
-        wire.send(said(("page:reset", ""), ("errors:set.EAX", "17"), ("page:close", "")))
+        reset = do.Signal.END_STORY, do.Signal.RESET_ERRORS
+        wire.send(said(*reset, do.SetError("EAX", "17"), do.Signal.CLOSE_DIALOG))
         assert wire.read_until(lambda: session.state.amplitudes["EAX"] == 17.0, 60.0)
         assert wire.read_until(lambda: 'data-text="17"' in wire.pieces["error.EAX"])
         assert wire.toasts

@@ -9,6 +9,7 @@ from app.frames import new_visitor
 from app.page_tab import SCENES, Tab
 from app.parts import LIVE, Alone
 from warpspace.analysis.note_tables import note_numbers
+from warpspace.app.browser import actions as do
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.drawing.labels import note_labels
 from warpspace.app.evaluation.machine_bodies import drawn_bodies
@@ -35,9 +36,9 @@ def alone(state=START):
 
 
 def pin(part, text="Look", kind="note"):
-    part.do("pin")
+    part.do(do.Input.PIN_NOTE())
     part.store.apply(lambda state: put(put(state, "page.note_text", text), "page.note_kind", kind))
-    return part.do("keep").review[-1]
+    return part.do(do.Input.SAVE_NOTE()).review[-1]
 
 
 def test_a_note_is_shown_again_as_it_was_and_back_leads_to_where_one_was():
@@ -46,11 +47,11 @@ def test_a_note_is_shown_again_as_it_was_and_back_leads_to_where_one_was():
     part.store.apply(lambda state: state.with_amplitude("EA0Z", 0.0))
     second = pin(part)
     present = part.store.apply(lambda state: state.with_amplitude("EA0Z", 5.0)) or part.store.state
-    assert part.do("show." + first.id).amplitudes["EA0Z"] == START.amplitudes["EA0Z"]
+    assert part.do(do.Input.SHOW_NOTE(first.id)).amplitudes["EA0Z"] == START.amplitudes["EA0Z"]
     assert "Note 1, state of" in part.part.render(part.context.picture)["reopened"]
-    assert part.do("show." + second.id).amplitudes["EA0Z"] == 0.0
-    part.do("reply." + second.id, "seen")  # is not lost
-    back = part.do("back")
+    assert part.do(do.Input.SHOW_NOTE(second.id)).amplitudes["EA0Z"] == 0.0
+    part.do(do.ReplyToNote(second.id, "seen"))  # is not lost
+    back = part.do(do.Signal.LEAVE_NOTE_VIEW)
     assert replace(back, review=present.review) == present
     assert back.review[1].replies[0].text == "seen"
     assert cameras == [CAMERA] * 3
@@ -71,15 +72,15 @@ def test_a_decision_holds_what_was_changed_and_is_taken_back_where_it_still_hold
     part, _ = alone()
     part.context.last_decision = START, "Repair: EA0Z to 20"
     part.store.apply(lambda state: state.with_amplitude("EA0Z", 20.0).with_amplitude("EB0Z", 1.5))
-    part.do("decide")
-    note = part.do("keep").review[0]
+    part.do(do.Signal.RECORD_DECISION)
+    note = part.do(do.Input.SAVE_NOTE()).review[0]
     assert note.kind == "decision"
     assert note.text == "Repair: EA0Z to 20\nReason:"
     was = START.amplitudes
     assert note.change == {"EA0Z": (was["EA0Z"], 20.0), "EB0Z": (was["EB0Z"], 1.5)}
     assert note.before != note.numbers
     part.store.apply(lambda state: state.with_amplitude("EB0Z", 2.0))
-    found = part.do("take-back." + note.id)
+    found = part.do(do.EditNote(note.id, "revert"))
     assert found.amplitudes == {**was, "EB0Z": 2.0}
     assert "EB0Z not reverted: now 2 instead of 1.5" in found.review[0].replies[0].text
 
@@ -88,11 +89,11 @@ def test_one_of_two_versions_stays_and_what_was_deleted_comes_back():
     base = Note(id="a1", text="old")
     mine, yours = base.edited(text="mine"), base.edited(text="yours")
     part, _ = alone(replace(START, review=(replace(mine, versions=(yours,)),)))
-    kept = part.do("choose.a1", "1").review[0]
+    kept = part.do(do.ChooseVersion("a1", 1)).review[0]
     assert (kept.text, kept.versions) == ("yours", ())
     assert {mine.version, yours.version} <= set(kept.replaces)
-    part.do("delete.a1")
-    part.do("step.a1", "add")  # of a note that has gone
+    part.do(do.EditNote("a1", "delete"))
+    part.do(do.EditNote("a1", "add"))  # of a note that has gone
     assert part.store.state.review == ()
     part.store.undo()
     assert part.store.state.review == (kept,)
@@ -101,18 +102,17 @@ def test_one_of_two_versions_stays_and_what_was_deleted_comes_back():
 def test_a_story_is_put_in_order_and_what_two_have_edited_waits_for_a_choice():
     one, two, three = (Note(id=name, text=name) for name in ("a", "b", "c"))
     part, _ = alone(replace(START, review=(one, two, three)))
-    for word, value, wanted in (
-        ("step.b", "add", "b"), ("step.c", "add", "bc"), ("step.a", "add", "bca"),
-        ("step.b", "up", "bca"), ("step.a", "up", "bac"), ("step.b", "down", "abc"),
-        ("step.a", "out", "bc"),
+    for name, move, wanted in (
+        ("b", "add", "b"), ("c", "add", "bc"), ("a", "add", "bca"), ("b", "up", "bca"),
+        ("a", "up", "bac"), ("b", "down", "abc"), ("a", "out", "bc"),
     ):  # fmt: skip
-        found = story(part.do(word, value).review)
+        found = story(part.do(do.EditNote(name, move)).review)
         assert "".join(note.id for note in found) == wanted
         assert [note.step for note in found] == [*range(1, len(wanted) + 1)]
     two = part.store.state.review[1]
     torn = replace(two.edited(text="mine"), versions=(two.edited(text="yours"),))
     part.store.apply(lambda state: replace(state, review=(one, torn, three)))
-    assert part.do("step.a", "add").review == (one, torn, three)
+    assert part.do(do.EditNote("a", "add")).review == (one, torn, three)
 
 
 def test_a_note_on_a_trace_or_a_body_is_pinned_where_that_is_drawn():
@@ -123,10 +123,12 @@ def test_a_note_on_a_trace_or_a_body_is_pinned_where_that_is_drawn():
     assert (traced.at["B"], {*traced.at}) == (20.0, {*START.scene.machine.axes})
     found = explain_point(START, point, 1.0)
     assert traced.numbers["here_um"] == pytest.approx(np.linalg.norm(found.drawn_um), abs=0.02)
-    assert part.do("show." + replace(traced, view="").id).picked.point_mm == point.point_mm
+    assert (
+        part.do(do.Input.SHOW_NOTE(replace(traced, view="").id)).picked.point_mm == point.point_mm
+    )
     part.store.apply(lambda state: put(state, "page.note_place", "Z"))
     part.store.apply(lambda state: put(state, "page.note_text", "Column"))
-    body = part.do("keep").review[-1]
+    body = part.do(do.Input.SAVE_NOTE()).review[-1]
     assert (body.on, dict(body.at)) == (NoteAnchor(body="Z"), {})
     state = replace(START, review=(traced, body))
     (flag,) = note_labels(LIVE.evaluate(state))  # no body is drawn
@@ -153,13 +155,19 @@ def test_flags_stand_where_the_points_asked_about_are_drawn(name):
         np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-3)
 
 
-@pytest.mark.parametrize("word", ["show", "choose.a1", "keep.a1", "at", "step.b2", "back"])
-def test_hostile_events_change_nothing(word):
+@pytest.mark.parametrize(
+    "action",
+    [
+        do.Input.SHOW_NOTE(EVIL), do.ChooseVersion("a1", 9), do.Input.SAVE_NOTE("a1"),
+        do.RevealNote(0), do.RevealNote(99), do.EditNote("b2", "add"), do.ReplyToNote(EVIL, "x"),
+        do.Signal.LEAVE_NOTE_VIEW,
+    ],
+)  # fmt: skip
+def test_hostile_actions_change_nothing(action):
     part, _ = alone(replace(START, review=(Note(id="a1", text=EVIL, author=EVIL),)))
-    for value in (EVIL, "9", "99999999", "-1"):
-        review = part.store.state.review
-        assert part.do(word, value).review == review
-    part.do("open")
+    review = part.store.state.review
+    assert part.do(action).review == review
+    part.do(do.Signal.OPEN_NOTES)
     assert "<img" not in str(part.part.render(part.context.picture))
 
 
@@ -184,8 +192,8 @@ def test_a_note_in_the_browser(browser):
         page.locator(".ws-words [data-kind=note]").wait_for()
         page.reload()
         page.wait_for_selector("html[data-warpspace=open]")
-        tab.send("state:set.amplitudes.EA0Z", "3")
-        tab.send("controls:view", "front")
+        tab.send(do.SetLeaf("amplitudes.EA0Z", "3"))
+        tab.send(do.ViewFrom("front"))
         tab.until(lambda: tab.state.amplitudes["EA0Z"] == 3.0)
         page.locator(".ws-words [data-kind=note]").click()
         page.locator("#ws-notes").get_by_text("changed: ").wait_for()
@@ -199,8 +207,8 @@ def test_a_note_in_the_browser(browser):
         tab.click("Back")
         tab.until(lambda: tab.state.amplitudes["EA0Z"] == 3.0)
         tab.until(lambda: np.allclose(stands(tab), before, rtol=0.0, atol=1e-6))
-        page.locator("#ws-notes [data-do^='notes:show']").focus()
+        page.locator("#ws-notes [data-do*=show_note]").focus()
         page.keyboard.press("Escape")
         tab.until(lambda: page.locator("#ws-notes > *").count() == 0)
-        assert page.evaluate("document.activeElement.dataset.do") == "notes:open"
+        assert page.evaluate("document.activeElement.dataset.do") == "open_notes"
         assert tab.errors == []

@@ -8,6 +8,7 @@ import pytest
 
 import warpspace
 from app.parts import LIVE, Alone, lone_part, section, wait
+from warpspace.app.browser import actions as do
 from warpspace.app.documents.legend import legend_html, marked, marks, ticks, within_limit_words
 from warpspace.app.drawing.colours import colour_levels
 from warpspace.app.drawing.labels import axes, point_labels
@@ -125,10 +126,10 @@ def test_a_scene_without_a_limit_is_not_judged_by_an_assumed_one():
     assert "No limit is set." in str(dialog.body(picture))
     for name in ("allocate", "conformance"):
         panel = lone_part(TolerancesPanel if name == "allocate" else AnalysisPanel, name)
-        panel.handle(state, "run", "")
+        panel.handle(state, do.Run(name))
         wait(panel)
         shown = section(panel, state)
-        assert 'data-set="state:set.specification.limit_um"' in shown
+        assert 'id="ws-SetLeaf-specification-limit-um"' in shown
         assert "Set a limit" in shown or "sets no limit" in shown
     # a limit that is set, or removed, is that of the scene; another scene has its own
     assert limited(40).resulting_scene().limit_um == 40.0
@@ -158,17 +159,17 @@ def test_the_worst_corner_is_labelled_once():
 
 def test_controls_set_what_is_coloured_and_how_the_machine_is_drawn():
     part = lone_part(ControlsPanel)
-    limit = part.handle(limited(40), "map", "limit")
+    limit = part.handle(limited(40), do.Input.COLOUR_BY("limit"))
     assert chosen_map(limit) == "limit"
-    assert chosen_map(part.handle(limit, "map", "orientation.y")) == "orientation.y"
+    assert chosen_map(part.handle(limit, do.Input.COLOUR_BY("orientation.y"))) == "orientation.y"
     for word, drawn in (("off", (False, False)), ("ghost", (False, True)), ("solid", (True, True))):
-        machine = part.handle(START, "machine", word).machine
+        machine = part.handle(START, do.ShowMachine(word)).machine
         assert (machine.shown, machine.ghost) == drawn
-    for word in ("map", "machine", "set.travel", "view"):
-        assert part.handle(START, word, "<script>").scene is FIRST
+    for kind in (do.Input.COLOUR_BY, do.Input.SET_TRAVEL):
+        assert part.handle(START, kind("<script>")).scene is FIRST
     html = pieces(ControlsPanel, START)["controls"]
-    assert 'data-set="state:set.look.isolines"' in html
-    assert 'data-value="slices"' in html
+    assert 'id="ws-SetLeaf-look-isolines"' in html
+    assert "look.surface&quot;,&quot;value&quot;:&quot;slices&quot;" in html
 
 
 def test_comparing_is_shown_and_left_by_one_switch():
@@ -178,9 +179,9 @@ def test_comparing_is_shown_and_left_by_one_switch():
     assert html.count('aria-pressed="true"') == 1
     part = lone_part(ComparePanel)
     part.context.scenes = {}
-    assert part.handle(pinned, "leave", "").comparison.b is None
-    assert part.handle(pinned, "set.b", NOBODY).comparison.b is None
-    assert part.handle(pinned, "set.a", "no such scene") is pinned
+    assert part.handle(pinned, do.Signal.END_COMPARISON).comparison.b is None
+    assert part.handle(pinned, do.SetSide("b", NOBODY)).comparison.b is None
+    assert part.handle(pinned, do.SetSide("a", "no such scene")) is pinned
     change = put(pinned, "comparison.shown", "difference")
     assert "change: mean" in pieces(HeadPanel, change)["head"]
     legend = pieces(LegendPanel, change)

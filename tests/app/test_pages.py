@@ -14,6 +14,7 @@ from app.wire import Wire, dial, opened
 from still_scenes import TEXTS, still_scene
 from warpspace.analysis.description import Analysis, Result
 from warpspace.analysis.registry import register, unregister
+from warpspace.app.browser import actions as do
 from warpspace.app.documents.output_services import CancelledError, Services
 from warpspace.app.evaluation import cache
 from warpspace.app.panels.error_list import used_keys
@@ -54,11 +55,11 @@ def test_what_lies_around_the_map_comes_when_that_is_drawn(wire, monkeypatch):
     monkeypatch.setattr(session, "ANSWER_S", 1e6)
     assert wire.read_until(lambda: wire.stage == "opening" and wire.calls["Page.drawn"] == 1)
     assert "GlbMessage" in wire.kinds
-    assert {name.rpartition(".")[2] for name in wire.sliders} >= KEYS
+    assert {*wire.sliders} >= KEYS
     lines = wire.kinds.count("LineSegmentsMessage")
     assert not wire.read_until(lambda: wire.is_open, seconds=0.5)
     assert wire.kinds.count("LineSegmentsMessage") == lines
-    wire.say("tab:drawn")
+    wire.say(do.Signal.DRAWN)
     assert wire.read_until(lambda: wire.is_open)
     assert wire.kinds.count("LineSegmentsMessage") > lines
 
@@ -196,7 +197,7 @@ def test_what_is_made_for_a_page_that_has_gone_is_given_up():
         return b""
 
     with opened(FIRST, services=Services(draw_figure=draw)) as (wire, _):
-        wire.say("files:figure")
+        wire.say(do.Signal.SAVE_FIGURE)
         assert begun.wait(20)
     assert given_up.wait(20)
 
@@ -225,7 +226,7 @@ def test_an_added_analysis_is_a_section_of_its_task_and_runs_there():
     try:
         with opened(FIRST) as (wire, _):
             assert "<h3>Notes</h3>" in wire.pieces["section.notes"]
-            wire.say("page:fold", "notes")
+            wire.say(do.Input.FOLD_SECTION("notes"))
             assert wire.read_until(lambda: "has 7 errors" in wire.pieces["section.notes"])
     finally:
         unregister("notes")

@@ -9,6 +9,7 @@ import trimesh
 
 from app.page_tab import open_page
 from app.parts import LIVE
+from warpspace.app.browser import actions as do
 from warpspace.app.documents.legend import GEOMETRY_ONLY, part_html
 from warpspace.app.documents.scene_file import open_link, open_text, state_to_link, state_to_toml
 from warpspace.app.evaluation.compare import with_pin
@@ -161,7 +162,7 @@ def test_a_part_is_opened_bent_by_a_slider_turned_and_judged(tab):
     tab.until(lambda: drawn_part(tab))
     tab.says("as cut", within="[data-key=part]")  # measured by itself
     before = tab.page.inner_text(".ws-part")
-    tab.send("state:set.amplitudes.EC0Y", 90)
+    tab.send(do.SetLeaf("amplitudes.EC0Y", "90"))
     tab.until(lambda: tab.page.inner_text(".ws-part") != before and drawn_part(tab))
     place = tab.state.part.place
     tab.click("x 90°")

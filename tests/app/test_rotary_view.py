@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from app.parts import LIVE, Alone, lone_part
+from warpspace.app.browser import actions as do
 from warpspace.app.documents import legend
 from warpspace.app.drawing.around import draw_surroundings
 from warpspace.app.drawing.box import box
@@ -120,12 +121,11 @@ def test_a_machine_without_rotary_axes_has_no_switch():
 
 def test_the_switch_opens_the_polar_plots():
     part = Alone(ControlsPanel, START).part
-    state = part.handle(START, "drawing", "rotary")
+    state = part.handle(START, do.ShowDrawing("rotary"))
     assert state.shows_rotary
     assert state.page.task == "machine"
     assert "rotary" in state.page.open
-    assert not part.handle(state, "drawing", "volume").shows_rotary
-    assert part.handle(START, "drawing", "<b>") is START
+    assert not part.handle(state, do.ShowDrawing("volume")).shows_rotary
 
 
 def test_a_change_of_a_rotary_error_offers_the_drawing():
@@ -157,17 +157,17 @@ def test_play_begins_where_the_axis_was_scrubbed_to(axis, at):
 def test_the_bar_plays_pauses_scrubs_and_ignores_what_is_no_position():
     stage = Stage()
     bar = Alone(PlaybackPanel, ROTARY, stage=stage)
-    bar.do("play", "B")
-    bar.do("play", "B")
-    bar.do("play", "")
-    bar.do("set.C", "140")
-    bar.do("set.B", "1e9")
+    bar.do(do.Input.PLAY("B"))
+    bar.do(do.Input.PLAY("B"))
+    bar.do(do.Input.PLAY())
+    bar.do(do.Scrub("C", "140"))
+    bar.do(do.Scrub("B", "1e9"))
     for hostile in ("nan", "<b>", "", "9" * 400):
-        bar.do("set.C", hostile)
-    bar.do("set.X", "5")
-    bar.do("speed", "90")
-    bar.do("speed", "inf")
-    bar.do("stop")
+        bar.do(do.Scrub("C", hostile))
+    bar.do(do.Scrub("X", "5"))
+    bar.do(do.Input.SET_SPEED("90"))
+    bar.do(do.Input.SET_SPEED("inf"))
+    bar.do(do.Signal.STOP_PLAYBACK)
     high = FIRST.machine.axes["B"].travel[1]
     top = FIRST.machine.axes["C"].travel[1]
     assert stage.asked == [
@@ -195,7 +195,7 @@ def test_a_program_is_played_to_its_worst_block_with_line_error_and_cause():
     assert picture.path is not None
     bar = Alone(PlaybackPanel, state, stage=stage)
     assert 'aria-label="Position in the program"' in bar.part.render(picture)["playback"]
-    bar.do("worst")
+    bar.do(do.Signal.SHOW_WORST_BLOCK)
     lengths = np.linalg.norm(picture.path.error_um, axis=1)
     assert stage.asked == [("play", False, None), ("program", int(np.argmax(lengths)))]
     html = bar.part.render(picture)["playback"]
@@ -204,10 +204,10 @@ def test_a_program_is_played_to_its_worst_block_with_line_error_and_cause():
     assert PROGRAM_TEXT.splitlines()[line - 1] in html
     assert f"{lengths.max():.1f} µm, " in html
     assert " because " in html
-    bar.do("set.program", "3")
-    bar.do("set.program", "99999999")
-    bar.do("set.program", "<b>")
-    bar.do("play", "program")
+    bar.do(do.Scrub("program", "3"))
+    bar.do(do.Scrub("program", "99999999"))
+    bar.do(do.Scrub("program", "<b>"))
+    bar.do(do.Input.PLAY("program"))
     assert stage.asked[2:] == [("program", 3), ("play", True, "program")]
 
 
@@ -226,7 +226,7 @@ def test_the_cause_of_a_sample_is_that_of_the_explanation_of_its_point():
         assert value or not effects[key]
     first = max(effects, key=lambda key: abs(effects[key]))
     bar = Alone(PlaybackPanel, state, stage=Stage())
-    bar.do("worst")
+    bar.do(do.Signal.SHOW_WORST_BLOCK)
     assert f"because {parameter(first).cause}" in bar.part.render(picture)["playback"]
 
 

@@ -8,6 +8,7 @@ import pytest
 from app.page_tab import open_page
 from app.wire import Wire, dial, end_work
 from offline import EVIL, opened_offline, wait_for_the_map
+from warpspace.app.browser import actions as do
 from warpspace.app.browser.html import linked
 from warpspace.app.documents.offline_page import build_story_html
 from warpspace.app.documents.scene_file import view_of
@@ -114,13 +115,13 @@ def test_a_story_in_the_app_goes_from_step_to_step_and_back_to_before(browser):
     with Viewer(scene, shared=True) as viewer:
         tab = open_page(viewer, browser)
         before, camera_before = tab.state, tab.still(lambda: place_of(tab))
-        tab.send("state:set.component", "y")
+        tab.send(do.SetLeaf("component", "y"))
         tab.until(lambda: tab.state.component == "y")
         before = tab.state
         with tab.page.expect_download() as file:
-            tab.send("files:story")
+            tab.send(do.Signal.SAVE_STORY)
         assert file.value.suggested_filename == "dvf5000_first_story.html"
-        tab.send("story:start")
+        tab.send(do.Signal.START_STORY)
         tab.says("1 of 8", "#ws-story")
         tab.page.keyboard.press("ArrowRight")
         tab.says("2 of 8", "#ws-story")
@@ -147,15 +148,15 @@ def test_tabs_of_a_shared_review_see_each_others_notes_and_pointers():
     with Viewer(START.scene, shared=True) as viewer, dial(viewer) as mine, dial(viewer) as yours:
         one, other = Wire(mine), Wire(yours)
         assert all(tab.read_until(lambda tab=tab: tab.is_open, 60.0) for tab in (one, other))
-        for name, value in (("notes:pin", ""), ("state:set.page.note_text", "Why?"),
-                            ("notes:keep", "")):  # fmt: skip
-            one.say(name, value)
-        other.say("notes:open")
+        for action in (do.Input.PIN_NOTE(), do.SetLeaf("page.note_text", "Why?"),
+                       do.Input.SAVE_NOTE()):  # fmt: skip
+            one.say(action)
+        other.say(do.Signal.OPEN_NOTES)
         assert other.read_until(lambda: "Why?" in other.pieces["notes"])
-        for hostile in ("1,2,3", "nan,0,0,0,0,1", "0,0,0,0,0,0", "x" * 5000, "1e300,0,0,1,1,1"):
-            one.say("pointer:at", hostile)
-        ray = f"0,-20,1.5,0,1,0\n{EVIL}"  # of those that follow too soon none is taken
-        assert other.read_until(lambda: one.say("pointer:at", ray) or any(pointer_of(other)[2:]))
+        for hostile in ((1, 2, 3), (np.nan, 0, 0, 0, 0, 1), (0,) * 6, "x", (1e300, 0, 0, 1, 1, 1)):
+            one.say(do.PointAt(hostile, ""))
+        at = do.PointAt((0, -20, 1.5, 0, 1, 0), EVIL)  # of those too soon after it none is taken
+        assert other.read_until(lambda: one.say(at) or any(pointer_of(other)[2:]))
         assert pointer_of(other)[1] == " ".join(EVIL[:24].split())
         assert pointer_of(other)[2] == pytest.approx([0.0, -1.95, 1.5], abs=0.1)
         mine.close()

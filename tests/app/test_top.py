@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from app.parts import Alone, wait
+from warpspace.app.browser import actions as do
 from warpspace.app.documents.output_services import Services
 from warpspace.app.documents.scene_file import SceneList, open_link
 from warpspace.app.documents.transfers import unpack
@@ -23,12 +24,12 @@ HOSTILE = "<img src=x onerror=alert(1)>.csv"
 
 def test_undo_is_there_when_there_is_something_to_undo_and_says_what():
     bar = Alone(page_panels.TopPanel, STATE)
-    assert 'data-do="page:undo"' not in bar.html
+    assert 'data-do="undo"' not in bar.html
     bar.store.apply(lambda state: state.with_amplitude("EAX", 7.0))
     assert "Undo: roll of X (Ctrl+Z)" in bar.html
     bar.store.undo()
-    assert 'data-do="page:redo"' in bar.html
-    assert 'data-do="page:undo"' not in bar.html
+    assert 'data-do="redo"' in bar.html
+    assert 'data-do="undo"' not in bar.html
 
 
 def test_scenes_are_chosen_by_title_and_escaped():
@@ -37,21 +38,21 @@ def test_scenes_are_chosen_by_title_and_escaped():
     window = Alone(page_panels.ScenesDialog, STATE, scenes=scenes)
     assert "<img" not in window.html
     assert window.html.count('aria-current="true"') == 1
-    assert window.do("choose", "nothing of that name").scene is FIRST
-    assert window.do("choose", SECOND.title).scene is SECOND
+    assert window.do(do.Input.CHOOSE_SCENE("nothing of that name")).scene is FIRST
+    assert window.do(do.Input.CHOOSE_SCENE(SECOND.title)).scene is SECOND
 
 
 def test_every_key_is_there_once_and_none_without_ctrl_changes_the_model():
     keys = [key for one in page_panels.COMMANDS for key in one.keys]
-    assert len(keys) == len(set(keys)) == len(page_panels.key_events())
+    assert len(keys) == len(set(keys)) == len(page_panels.key_actions())
     for command in page_panels.COMMANDS:
-        part, _, word = command.event.partition(":")
-        if part in ("state", "page") and command.keys and "ctrl" not in command.keys[0]:
-            kinds = {"state": page_panels.StatePanel, "page": page_panels.PagePanel}
-            window = Alone(kinds[part], STATE)
+        kinds = (page_panels.StatePanel, page_panels.PagePanel)
+        windows = [Alone(kind, STATE) for kind in kinds]
+        windows = [window for window in windows if window.part.handles(command.action)]
+        for window in windows if command.keys and "ctrl" not in command.keys[0] else ():
             window.part.context.store.apply(lambda state: state.with_amplitude("EAX", 7.0))
             before = replace(window.store.state, exaggeration=None).resulting_scene()
-            after = window.do(word, command.value)
+            after = window.do(command.action)
             assert replace(after, exaggeration=None).resulting_scene() == before, command.label
 
 
@@ -65,30 +66,30 @@ def help_dialog():
 def test_commands_are_found_by_words_and_enter_runs_the_first():
     window = help_dialog()
     window.store.apply(lambda state: put(state, "page.command", "zero err"))
-    assert window.html.count('data-do="help:run"') == 1
-    window.do("first", "whatever")
-    assert window.sent == [("page:zero", "")]
-    window.do("run", HOSTILE)
+    assert window.html.count("run_command") == 1
+    window.do(do.Input.RUN_FIRST_COMMAND("zero err"))
+    assert window.sent == [do.Signal.ZERO_ERRORS]
+    window.do(do.Input.RUN_COMMAND(HOSTILE))
+    window.do(do.Input.RUN_FIRST_COMMAND())
     assert len(window.sent) == 1
 
 
 @pytest.mark.parametrize(
-    ("query", "event"),
+    ("query", "action"),
     [
-        ("compare", ("compare:menu", "")),
-        ("circular", ("test:choose", "circular")),
-        ("ball bar", ("test:choose", "circular")),
-        ("toleranc", ("page:section", "design.allocate")),
-        ("import", ("page:section", "measure.import")),
-        ("adjust", ("page:section", "improve.adjust")),
-        ("gains", ("page:section", "understand.gains")),
+        ("compare", do.Signal.OPEN_COMPARISON),
+        ("circular", do.Input.CHOOSE_TEST("circular")),
+        ("ball bar", do.Input.CHOOSE_TEST("circular")),
+        ("toleranc", do.OpenSection("design", "allocate")),
+        ("import", do.OpenSection("measure", "import")),
+        ("adjust", do.OpenSection("improve", "adjust")),
+        ("gains", do.OpenSection("understand", "gains")),
     ],
 )
-def test_sections_and_tests_are_found_by_the_words_of_users(query, event):
+def test_sections_and_tests_are_found_by_the_words_of_users(query, action):
     window = help_dialog()
-    window.store.apply(lambda state: put(state, "page.command", query))
-    window.do("first")
-    assert window.sent == [event]
+    window.do(do.Input.RUN_FIRST_COMMAND(query))
+    assert window.sent == [action]
 
 
 def test_a_search_without_a_match_says_so():
@@ -99,24 +100,24 @@ def test_a_search_without_a_match_says_so():
 
 def test_a_section_is_opened_in_its_task():
     page = Alone(page_panels.PagePanel, put(STATE, "page.window", "help"))
-    page.do("section", "design.concepts")
+    page.do(do.OpenSection("design", "concepts"))
     look = page.store.state.page
     assert (look.task, look.window) == ("design", "")
     assert "concepts" in look.open
-    page.do("section", HOSTILE)
+    page.do(do.OpenSection(HOSTILE, HOSTILE))
     assert page.store.state.page.task == "design"
 
 
 def test_a_link_says_what_it_holds_and_asks_before_it_holds_the_token():
     window = Alone(FilesDialog, STATE.with_amplitude("EAX", 7.0))
-    window.do("share")
+    window.do(do.Share())
     (name, _, token, words) = window.called[-1]
     assert (name, token) == ("share", None)
     assert "1 changed error" in words
     asking = Alone(FilesDialog, STATE, services=Services(token="secret"))
-    assert asking.do("share").page.window == "files"
+    assert asking.do(do.Share()).page.window == "files"
     assert asking.called == []
-    asking.do("share", "token")
+    asking.do(do.Share("with_token"))
     assert asking.called[-1][2] == "secret"
     assert "Copy link with token" in asking.html
     assert "secret" not in asking.html
@@ -127,7 +128,7 @@ def test_a_link_that_notes_make_too_large_leaves_them_out_and_says_so():
     notes = [Note(id=f"n{at}", text="".join(texts[at : at + 2000])) for at in range(0, 8000, 2000)]
     for count, expected in ((1, 1), (4, 0)):
         window = Alone(FilesDialog, replace(STATE, review=tuple(notes[:count])))
-        window.do("share")
+        window.do(do.Share())
         opened, _ = open_link(unpack(window.called[-1][1]), None)
         assert opened.review == tuple(notes[:expected])
         assert ["Notes not included" in one[0] for one in window.said] == [True] * (1 - expected)
@@ -136,12 +137,12 @@ def test_a_link_that_notes_make_too_large_leaves_them_out_and_says_so():
 
 def test_files_that_a_page_refuses_or_invents_are_said_or_left():
     window = Alone(FilesDialog, STATE)
-    window.do("file", f"²\n{HOSTILE}\n")
+    window.do(do.Upload("files", HOSTILE, 1, "²"))
     assert "was not received completely" in window.said[-1][1]
-    window.do("file", f"{10**9}\n{HOSTILE}\n")
+    window.do(do.Upload("files", HOSTILE, 10**9, ""))
     assert "expected a scene file of at most" in window.said[-1][1]
-    window.do("export", "../../etc/passwd")
-    window.do("link", "no link")
+    window.do(do.Input.EXPORT("../../etc/passwd"))
+    window.do(do.Input.FOLLOW_LINK("no link"))
     assert window.saved == []
     assert "cannot be read" in window.said[-1][1]
 
@@ -154,11 +155,10 @@ def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_ow
     page = replace(STATE.page, author=HOSTILE, questions="one\n\n two ")
     window.store.apply(lambda state: replace(state, page=page))
     assert "<img" not in window.html
-    window.do("remove", "2")
-    window.do("remove", "7")
-    window.do("write", ".exe")
+    window.do(do.RemoveFromReport(2))
+    window.do(do.RemoveFromReport(7))
     assert asked == []
-    window.do("write", ".pdf")
+    window.do(do.WriteReport(".pdf"))
     wait(window.part)
     ((author, questions, results, *_),) = asked
     assert (author, questions) == (HOSTILE, ("one", "two"))
@@ -170,6 +170,6 @@ def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_ow
 def test_a_scene_is_saved_with_a_warning_where_its_file_has_changed(is_current):
     services = Services(is_current=lambda _: is_current)
     window = Alone(FilesDialog, STATE, services=services)
-    window.do("save")
+    window.do(do.Signal.SAVE_SCENE)
     assert len(window.saved) == 1
     assert ["changed on the server" in one[0] for one in window.said] == [True] * (not is_current)

@@ -11,6 +11,7 @@ from products import first
 from warpspace.analysis.commands.distance import Distance
 from warpspace.analysis.description import ignore_progress
 from warpspace.analysis.registry import entries
+from warpspace.app.browser import actions as do
 from warpspace.app.drawing.around import draw_surroundings
 from warpspace.app.drawing.labels import point_labels
 from warpspace.app.evaluation import point_explanation
@@ -186,16 +187,16 @@ def test_the_worst_point_of_the_thesis_and_another_one():
     part = lone_part(WorstPanel)
     assert ": 51.7 µm" in html_of(part)
     assert re.search(r'title="squareness of Z to Y[^"]*">EA0Z</b></th><td>\+49.1', html_of(part))
-    typed = part.handle(START, "set.at", "X 0 Y 0 Z −280")
+    typed = put(START, "picked", "X 0 Y 0 Z −280")
     assert "This point" in html_of(part, typed)
-    assert part.handle(typed, "forget", "").picked is None
+    assert part.handle(typed, do.Signal.FORGET_POINT).picked is None
     part.context.picture = LIVE.evaluate(START)
-    asked = part.handle(START, "lever", "EA0Z")
+    asked = part.handle(START, do.Input.SHOW_LEVER_OF("EA0Z"))
     assert (asked.lever, asked.picked) == ("EA0Z", pick_worst(part.context.picture))
     assert "mm lever arm" in html_of(part, asked)
     for word in ("<img>", "", "x" * 500):
-        assert part.handle(START, "lever", word).lever == ""
-        assert "<img" not in html_of(part, part.handle(START, "set.at", word))
+        assert part.handle(START, do.Input.SHOW_LEVER_OF(word)).lever == ""
+        assert "<img" not in html_of(part, put(START, "picked", word))
 
 
 def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_holds():
@@ -204,24 +205,24 @@ def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_hold
     html = settled(part)
     assert "EA0Z 33.9 → 20.2 µrad" in html
     assert "30.9 → 24.6 µm" in html
-    applied = part.handle(START, "apply", "0")
+    applied = part.handle(START, do.Apply("best", 0))
     assert LIVE.evaluate(applied).statistics.max_um == pytest.approx(50.23, abs=0.01)
     assert applied.comparison.b is not None
-    previewed = part.handle(START, "preview", "0")
+    previewed = part.handle(START, do.Preview("best", 0))
     assert previewed.comparison.b.title == "after adjustment: EA0Z → 20.2"
     assert previewed.amplitudes == START.amplitudes
     assert LIVE.evaluate(previewed).statistics.max_um == pytest.approx(50.23, abs=0.01)
     moved = START.with_amplitude("EAX", 9.0)
     assert "disabled" in html_of(part, moved)
     wait(part)
-    for state, word, number in ((START, "apply", "0"), (moved, "apply", "7"), (moved, "x", "0")):
-        assert part.handle(state, word, number) is state
+    for state, card in ((START, 0), (moved, 7)):
+        assert part.handle(state, do.Apply("best", card)) is state
 
 
 def test_excluded_errors_are_neither_adjusted_nor_lost():
     state, part = put(START, "exclusions.excluded", "+EA0Z"), lone_part(BestPanel)
     assert "EA0Z" not in settled(part, state)
-    applied = part.handle(state, "apply", "0")
+    applied = part.handle(state, do.Apply("best", 0))
     assert applied.amplitudes["EA0Z"] == START.amplitudes["EA0Z"]
     state = put(START, "exclusions.excluded", ",".join(START.amplitudes))
     assert "No single adjustment improves it." in settled(part, state)
@@ -258,7 +259,7 @@ def click(alone, at, **more):
 
 def test_clicks_set_start_end_and_corner_in_turn_and_then_ask_about_a_point_again():
     alone = measuring(exact="1")
-    alone.do("pick")
+    alone.do(do.Signal.PICK_POINTS)
     assert "first point" in alone.html
     waiting = alone.store.state.forms
     assert click(alone, {"X": 1.0}, point_mm=(0.0, 0.0, 0.0)).forms == waiting
@@ -268,15 +269,15 @@ def test_clicks_set_start_end_and_corner_in_turn_and_then_ask_about_a_point_agai
     assert state.forms["distance.corner"] == "X=0,Y=200"
     assert state.picked is None
     assert click(alone, {"X": 7.0}).picked == Picked({"X": 7.0})
-    assert alone.do("clear").forms == {"distance.exact": "1"}
+    assert alone.do(do.Signal.CLEAR_POINTS).forms == {"distance.exact": "1"}
 
 
 def test_a_folded_section_takes_no_clicks():
     alone = measuring()
-    alone.do("pick")
+    alone.do(do.Signal.PICK_POINTS)
     alone.store.apply(lambda state: replace(state, page=replace(state.page, open=frozenset())))
     assert click(alone, {"X": 7.0}).picked == Picked({"X": 7.0})
-    assert alone.do("stop").forms == {}
+    assert alone.do(do.Signal.STOP_PICKING).forms == {}
 
 
 def test_a_measured_distance_is_drawn_between_the_displaced_points_with_its_six_numbers():

@@ -6,6 +6,7 @@ import pytest
 
 from app.hostile import upload
 from app.wire import opened
+from warpspace.app.browser import actions as do
 from warpspace.app.panels import upload_panels
 from warpspace.exceptions import OptionError
 from warpspace.resources import scenes_dir
@@ -32,8 +33,7 @@ def held(monkeypatch):
 
 
 def send(wire, name):
-    event, value = upload(name, STL)
-    wire.say(event.replace("files:", "part:"), value)
+    wire.say(upload(name, STL, "part"))
 
 
 def test_a_tab_goes_on_while_its_files_are_parsed_in_order(held):
@@ -42,7 +42,7 @@ def test_a_tab_goes_on_while_its_files_are_parsed_in_order(held):
         for name in ("bad.stl", "good.stl"):
             send(wire, name)
         assert wire.read_until(lambda: bool(begun))
-        wire.say("errors:set.EXX", "3")
+        wire.say(do.SetError("EXX", "3"))
         assert wire.read_until(lambda: 'data-text="3"' in wire.pieces["error.EXX"])
         assert (begun, session.state.part.mesh) == (["bad.stl"], None)
         go_on.set()
@@ -54,8 +54,8 @@ def test_the_error_of_a_file_stands_in_its_section(held):
     go_on, _ = held
     go_on.set()
     with opened(load_scene("part_on_dvf5000")) as (wire, _):
-        wire.say("page:task", "measure")
-        wire.say("page:fold", "part")
+        wire.say(do.SetLeaf("page.task", "measure"))
+        wire.say(do.Input.FOLD_SECTION("part"))
         send(wire, "bad.stl")
         assert wire.read_until(lambda: "bad.stl: expected triangles" in str(wire.pieces))
 

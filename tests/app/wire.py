@@ -9,6 +9,7 @@ from typing import Any
 from websockets.sync.client import ClientConnection, connect
 
 from page_client import CAMERA, HOW, Page, pack, said, unpack
+from warpspace.app.browser import actions as do
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.scene.model import Scene
@@ -26,14 +27,14 @@ class Wire(Page):
         super().__init__()
         self.socket = socket
         self.kinds: list[str] = []
-        self.say("tab:here", tab or secrets.token_hex(16))
+        self.say(do.TabHere(tab or secrets.token_hex(16)))
         self.send(CAMERA)
 
     def send(self, message: dict[str, Any]) -> None:
         self.socket.send(pack(message))
 
-    def say(self, name: str, value: object = "") -> None:
-        self.send(said((name, value)))
+    def say(self, action: object) -> None:
+        self.send(said(action))
 
     def read_until(self, fine: Callable[[], bool], seconds: float = 20.0) -> bool:
         """Read until something holds; tell whether it did before nothing came any more."""

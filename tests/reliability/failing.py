@@ -11,6 +11,7 @@ from unittest.mock import patch
 
 from app.wire import Wire, dial, end_work
 from reliability.outcome import Outcome
+from warpspace.app.browser import actions as do
 from warpspace.app.drawing.box import BoxLayer
 from warpspace.app.drawing.moving import MovingLayer
 from warpspace.app.evaluation import live_picture
@@ -78,7 +79,7 @@ class Review:
 
     def set(self, key: str, value: float, tab: int = 0) -> bool:
         """Set an error from one tab; tell whether both show it."""
-        self.wires[tab].say(f"errors:set.{key}", f"{value:g}")
+        self.wires[tab].say(do.SetError(key, f"{value:g}"))
         return self.shown(key, value)
 
     def shown(self, key: str, value: float) -> bool:
@@ -111,8 +112,8 @@ class Review:
             value += 1.0
             self.set("EXX", value)
         elif way == "redo":
-            first.say("page:undo")
-            first.say("page:undo")
+            first.say(do.Signal.UNDO)
+            first.say(do.Signal.UNDO)
             self.shown("EXX", value)
         for wire in self.wires:
             wire.toasts.clear()
@@ -122,7 +123,7 @@ class Review:
             faults.append("the tabs do not come to rest")
         time.sleep(0.05)  # the last part may still be written
         with failing(stage, raised):
-            first.say(*(("errors:set.EXX", f"{BAD:g}") if way == "edit" else (f"page:{way}",)))
+            first.say(do.SetError("EXX", f"{BAD:g}") if way == "edit" else do.Signal(way))
             if not self.until(has_message):
                 faults.append("a tab has no message")
             if not self.shown("EXX", value) or self.sessions[0].state.amplitudes["EXX"] != value:

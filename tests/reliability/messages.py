@@ -8,12 +8,12 @@ import sys
 import tempfile
 from pathlib import Path
 
-from app.hostile import connected, events, nonsense, send_all, steadily
+from app.hostile import actions, connected, nonsense, send_all, steadily
 from page_client import CAMERA, App, Tab, pack, running_app, said, until
 from reliability.outcome import Lag, Outcome
 from reliability.reading import HERE, mutate
+from warpspace.app.browser import actions as do
 
-PARTS = re.compile(r'data-(?:do|set|live|piece)="(?:section\.)?([a-z]+)[:"]')
 LONGEST_S = 1.0
 """What the honest tab may wait for an answer."""
 MOST_MB = 30.0
@@ -62,8 +62,7 @@ def run(count: int) -> Outcome:
 async def _attack(app: App, count: int, lag: Lag) -> tuple[int, list[float], float]:
     chance = random.Random(14)
     async with Tab(app) as honest, Tab(app) as hostile:
-        known = PARTS.findall("".join(hostile.pieces.values()))
-        mixed = nonsense() + events(sorted({*known, "page", "state"}))
+        mixed = nonsense() + actions()
         chance.shuffle(mixed)
         kinds = [one if isinstance(one, bytes) else pack(said(one)) for one in mixed]
         await honest.answer_s(20.0)
@@ -115,7 +114,7 @@ async def _flood(app: App, times: int, counts: dict[str, int]) -> None:
         async with connected(app) as socket:
             await socket.send(pack(CAMERA))
             for number in range(FLOOD):
-                await socket.send(pack(said(("errors:set.EAX", str(number % 20 / 2.0)))))
+                await socket.send(pack(said(do.SetError("EAX", str(number % 20 / 2.0)))))
                 counts["flood"] += 1
 
 
@@ -130,8 +129,8 @@ async def _read_nothing(app: App, chance: random.Random) -> None:
 async def _move_all(app: App, count: int) -> None:
     async with Tab(app) as tab:
         moves = (
-            pack(said((name, f"{20.0 * (number * 0.377 % 1.0) - 10.0:g}")))
-            for number, name in enumerate(itertools.cycle(tab.sliders))
+            pack(said(do.SetError(key, f"{20.0 * (number * 0.377 % 1.0) - 10.0:g}")))
+            for number, key in enumerate(itertools.cycle(tab.sliders))
         )
         await steadily(tab.socket, list(itertools.islice(moves, count)))
 

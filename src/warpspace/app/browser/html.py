@@ -1,7 +1,6 @@
 """HTML elements of the page: buttons, text boxes, sliders, choices, sections.
 
-Every text that is not `Markup` is escaped here. An element sends an event, ``panel:action`` with a
-value, see `incoming.py`.
+Every text that is not `Markup` is escaped here. An element sends an action, see `actions.py`.
 """
 
 import re
@@ -9,8 +8,10 @@ from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from html import escape
 
+import msgspec
 from markupsafe import Markup
 
+from warpspace.app.browser.actions import AnyAction
 from warpspace.units import MINUS
 
 EMPTY = Markup("")
@@ -52,8 +53,7 @@ def tag(name: str, body: object = "", **values: object) -> Markup:
 
 def button(
     label: object,
-    do: str,
-    value: object = None,
+    do: AnyAction | None,
     *,
     kind: str = "",
     hint: str = "",
@@ -61,18 +61,18 @@ def button(
     disabled: bool = False,
     **extra: object,
 ) -> Markup:
-    """Render a button that sends an event; `kind` is "", "main", "quiet" or "link"."""
+    """Render a button that sends an action; `kind` is "", "main", "quiet" or "link"."""
     state = None if pressed is None else str(pressed).lower()
     return tag(
         "button", label, type="button", class_=f"ws-button {kind}".strip(), data_do=do,
-        data_value=value, title=hint or None, aria_pressed=state, disabled=disabled, **extra,
+        title=hint or None, aria_pressed=state, disabled=disabled, **extra,
     )  # fmt: skip
 
 
 def upload_button(
     label: str, part: str, most_bytes: int, endings: str, *, hint: str, kind: str = ""
 ) -> Markup:
-    """Render a button that opens a file chooser; the files arrive as events ``panel:file``."""
+    """Render a button that opens a file chooser; the files arrive as `Upload` actions."""
     return tag(
         "button", label, type="button", class_=f"ws-button {kind}".strip(), data_upload=part,
         data_most=most_bytes, data_accept=endings, title=hint,
@@ -113,12 +113,16 @@ def linked(source: str) -> Markup:
 # --- Controls -------------------------------------------------------------------------------------
 
 
-def ident(name: str) -> str:
-    """Return the id of the element that sends an event."""
+def ident(name: AnyAction | str) -> str:
+    """Return the id of the element that sends an action, or has a name."""
+    if isinstance(name, msgspec.Struct):
+        name = "-".join((type(name).__name__, *filter(None, msgspec.structs.astuple(name))))
     return "ws-" + re.sub(r"[^0-9A-Za-z]+", "-", name)
 
 
-def field(label: object, control: Markup, name: str, unit: str = "", hint: str = "") -> Markup:
+def field(
+    label: object, control: Markup, name: AnyAction | str, unit: str = "", hint: str = ""
+) -> Markup:
     return fill(
         '<div class="ws-field"{title}><label for="{id}">{label}</label>{control}{unit}</div>',
         title=attributes(title=hint or None), id=ident(name), label=label, control=control,
@@ -130,7 +134,7 @@ def _input(**values: object) -> Markup:
     return Markup(f"<input{attributes(**values)}>")  # noqa: S704 - escaped there
 
 
-def text_box(name: str, value: str, *, placeholder: str = "", live: bool = False,
+def text_box(name: AnyAction, value: str, *, placeholder: str = "", live: bool = False,
              label: str = "", size: str = "", **extra: object) -> Markup:  # fmt: skip
     """Render a text box that sends its text on Enter or on blur; with `live` on each key."""
     return _input(
@@ -140,8 +144,8 @@ def text_box(name: str, value: str, *, placeholder: str = "", live: bool = False
     )  # fmt: skip
 
 
-def slider(name: str, value: float | str, low: float, high: float, step: float, *,
-           label: str = "", twin: str = "", text: str = "") -> Markup:  # fmt: skip
+def slider(name: AnyAction, value: float | str, low: float, high: float, step: float, *,
+           label: str = "", twin: AnyAction | str = "", text: str = "") -> Markup:  # fmt: skip
     """Render a slider; `twin` is the number box that receives digits typed on the slider."""
     return _input(
         type="range", id=None if not label else ident(name) + "-slider", class_="ws-slider",
@@ -152,7 +156,7 @@ def slider(name: str, value: float | str, low: float, high: float, step: float, 
     )  # fmt: skip
 
 
-def choice(name: str, value: str, labels: Mapping[str, str], *, label: str = "") -> Markup:
+def choice(name: AnyAction, value: str, labels: Mapping[str, str], *, label: str = "") -> Markup:
     options = join(
         tag("option", said, value=key, selected=key == value) for key, said in labels.items()
     )
@@ -161,19 +165,19 @@ def choice(name: str, value: str, labels: Mapping[str, str], *, label: str = "")
     )
 
 
-def switch(name: str, label: object, *, on: bool, hint: str = "") -> Markup:
+def switch(name: AnyAction, label: object, *, on: bool, hint: str = "") -> Markup:
     box = _input(type="checkbox", id=ident(name), checked=on, data_set=name)
     return tag("label", join((box, " ", label)), class_="ws-switch", title=hint or None)
 
 
 def fold(
-    key: str, heading: object, body: object, *, opens: str, open_: bool, hint: str = ""
+    key: str, heading: object, body: object, *, opens: AnyAction, open_: bool, hint: str = ""
 ) -> Markup:
     """Render a section with a heading that unfolds it; a folded one has no body."""
     head = fill(
-        '<summary class="ws-fold" data-do="{opens}" data-value="{key}"{hint}>'
+        '<summary class="ws-fold" data-do="{opens}"{hint}>'
         "<h3>{heading}</h3></summary>",
-        opens=opens, key=key, hint=attributes(title=hint or None), heading=heading,
+        opens=opens, hint=attributes(title=hint or None), heading=heading,
     )  # fmt: skip
     inner = tag("div", body, class_="ws-body") if open_ else EMPTY
     return tag("details", head + inner, data_key=key, class_="ws-section", open=open_)

@@ -1,8 +1,7 @@
 """Messages that a page may send: each is validated here before it is handled.
 
-Events of the page's own scripts (`page.js`), ``panel:action`` with a value, go to the session; a
-file is the value of ``panel:file``: its size, its name, its content in base64. Messages on camera,
-clicks and rendered pictures go to viser.
+Actions of the page's own scripts (`page.js`, `actions.py`) go to the session, messages on camera,
+clicks and rendered pictures to viser.
 viser would build an object of any type that a message names and set any attribute; here only these
 types pass, with fields of the right type and size. Invalid messages are ignored and the connection
 stays open, since a new one would cost the server more than an ignored message.
@@ -10,26 +9,21 @@ stays open, since a new one would cost the server more than an ignored message.
 
 import logging
 import struct
-from dataclasses import dataclass
 from typing import Annotated
 
 import msgspec
 from msgspec import Meta, Struct
 
+from warpspace.app.browser.actions import AnyAction, Number
+
 logger = logging.getLogger(__name__)
-LARGEST_NUMBER = 1e9
 LARGEST_SIDE_PX = 16_384  # of the page's picture, and of a picture that it renders
 PNG_START = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
 MOST_EVENTS = 16
-LONGEST_VALUE = 20_000  # of an event, except those that hold a file in base64
-LONG = (":file", ":kept")
 LONGEST_INDEX = 8  # digits
 
-Number = Annotated[float, Meta(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]  # NaN is neither
 Side = Annotated[float, Meta(ge=0, le=LARGEST_SIDE_PX)]
 Name = Annotated[str, Meta(max_length=1000)]
-EventName = Annotated[str, Meta(max_length=160, pattern=":")]
-EventValue = Annotated[str, Meta(max_length=15_500_000)]
 Vector = tuple[Number, Number, Number]
 
 
@@ -40,7 +34,7 @@ class _BrowserMessage(Struct, tag_field="type", forbid_unknown_fields=True):
 class Events(_BrowserMessage, tag="WarpspaceEvents"):
     """Actions of the user, in order."""
 
-    events: Annotated[list[tuple[EventName, EventValue]], Meta(max_length=MOST_EVENTS)]
+    events: Annotated[list[AnyAction], Meta(max_length=MOST_EVENTS)]
 
 
 class CameraMoved(_BrowserMessage, tag="ViewerCameraMessage"):
@@ -107,27 +101,11 @@ def read_message(raw: object) -> Message | None:
 
 
 def _is_fine(message: Message) -> bool:
-    if isinstance(message, Events):
-        return all(len(v) <= LONGEST_VALUE or name.endswith(LONG) for name, v in message.events)
     if not isinstance(message, PictureRendered):
         return True
     start, size = message.payload[: len(PNG_START)], message.payload[len(PNG_START) :][:8]
     is_png = start == PNG_START and len(size) == 8
     return is_png and max(struct.unpack(">II", size)) <= LARGEST_SIDE_PX
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """An action of the user; any field may hold any text, since it comes from a browser."""
-
-    part: str  # name of the panel
-    word: str  # action, or ``set.`` and the path of a setting
-    value: str
-
-
-def event_of(name: str, value: str) -> Event:
-    part, _, word = name.partition(":")
-    return Event(part, word, value)
 
 
 def index_of(value: str, count: int) -> int | None:

@@ -195,9 +195,9 @@
       if (label.textContent !== text) label.textContent = text;
       if (label.dataset.kind !== kind) label.dataset.kind = kind;
       if (kind === "note") {  // a click on a flag opens the list there
-        label.dataset.do = "notes:at";
-        label.dataset.value = text.replace(/\D/g, "");
-        label.classList.toggle("ws-changed", state.stale.includes(label.dataset.value));
+        const number = text.replace(/\D/g, "");
+        label.dataset.do = JSON.stringify({ do: "RevealNote", number: Number(number) });
+        label.classList.toggle("ws-changed", state.stale.includes(number));
       } else if (label.dataset.do) { delete label.dataset.do; label.classList.remove("ws-changed"); }
       label.style.transform = `translate(${x.toFixed(1)}px,${y.toFixed(1)}px)`;
     });
@@ -258,8 +258,9 @@
       const z = zoom(), head = part("head"), foot = part("foot"), legend = part("legend");
       const top = z * (head.offsetTop + head.offsetHeight), bottom = rect.height - z * foot.offsetTop;
       const right = rect.width - z * legend.offsetLeft;
-      warpspacePage.send("overlay:size",
-        [performance.now(), rect.width, rect.height, top, bottom, right].map(Math.round).join());
+      const sizes = Object.entries({ width: rect.width, height: rect.height, top, bottom, right });
+      const rounded = sizes.map(([name, size]) => [name, Math.max(0, Math.round(size))]);
+      warpspacePage.send({ do: "Resize", ...Object.fromEntries(rounded) });
     }, SETTLED_MS);
   };
 

@@ -1,9 +1,9 @@
 // The page around the drawing: top bar, error list, tasks, overlay of the drawing. The server writes
-// HTML into named places; user actions go back as events. This file is independent of the contents.
+// HTML into named places; actions of the user (actions.py) go back. This file is independent of the contents.
 (() => {
   if (window.warpspacePage) return;
   const MOST_EVENTS = 16, SEND_MS = 30, TOAST_MS = 8000, MOST_FILES = 16;
-  const pending = [];  // events
+  const pending = [];  // actions, each with its JSON but for the value of the user
   const texts = new Map();  // of all places, including those that do not exist yet
   const known = { keys: {} };
   let timer = 0, last = 0;
@@ -78,11 +78,11 @@
       if (!childNodes.length && texts.get(dataset.piece)) write(dataset.piece, texts.get(dataset.piece));
     if (name === "window") showWindow(place);
     if (name === "notes") prepareNotes(place);
-    place.querySelectorAll(`[data-set="${AUTHOR}"]`).forEach(fillAuthor);
+    place.querySelectorAll(`[data-set='${AUTHOR}']`).forEach(fillAuthor);
   };
 
   // --- review notes: an opening form takes the focus; the author is stored in this browser ---------
-  const AUTHOR = "state:set.page.author", AUTHOR_KEY = "warpspace-author";
+  const AUTHOR = JSON.stringify({ do: "SetLeaf", path: "page.author" }), AUTHOR_KEY = "warpspace-author";
   const prepareNotes = place => {
     const first = place.querySelector("textarea"), form = first?.closest("[data-key]").dataset.key;
     if (first && known.form !== form) first.focus();
@@ -106,22 +106,28 @@
     const dialog = document.getElementById("ws-window");
     dialog.replaceChildren();
     showWindow(dialog);
-    send("page:close");
+    send("close_dialog");
   };
 
-  // --- events, in order: the first is sent immediately, those that follow quickly are sent together -
+  // --- actions, in order: the first is sent immediately, those that follow quickly are sent together -
   const post = events => window.__viserMutable.sendMessage({ type: "WarpspaceEvents", events });
   const flush = () => {
     clearTimeout(timer);
     timer = window.__viserMutable ? 0 : setTimeout(flush, SEND_MS);
     if (timer || !pending.length) return;
     last = performance.now();
-    post(pending.splice(0, MOST_EVENTS));
+    post(pending.splice(0, MOST_EVENTS).map(([, action]) => action));
   };
-  const send = (name, value = "") => {
-    const same = pending.findIndex(([other]) => other === name);
-    if (same >= 0 && name.includes(":set.")) pending.splice(same, 1);
-    pending.push([name, String(value)]);
+  // an action, or its JSON; of one with a value only the latest is sent
+  const send = (action, value) => {
+    const text = typeof action === "string" ? action : JSON.stringify(action);
+    const read = text.startsWith("{") ? JSON.parse(text) : text;
+    if (value === undefined) { pending.push(["", read]); }
+    else {
+      const same = pending.findIndex(([other]) => other === text);
+      if (same >= 0) pending.splice(same, 1);
+      pending.push([text, { ...read, value: String(value) }]);
+    }
     if (pending.length >= MOST_EVENTS || !timer && performance.now() - last >= SEND_MS) flush();
     else timer ||= setTimeout(flush, Math.max(0, SEND_MS - (performance.now() - last)));
   };
@@ -130,8 +136,8 @@
   shell.addEventListener("click", event => {
     const part = event.target.closest("[data-do]");
     if (part?.tagName === "SUMMARY") event.preventDefault();
-    if (part?.dataset.do === "page:close") closeWindow();
-    else if (part && !part.disabled) send(part.dataset.do, part.dataset.value);
+    if (part?.dataset.do === "close_dialog") closeWindow();
+    else if (part && !part.disabled) send(part.dataset.do);
     event.target.closest(".ws-menu button")?.closest("details").removeAttribute("open");
     const number = event.target.closest("[data-box]");
     if (number && event.target.tagName !== "INPUT") typeInto(number).select();
@@ -150,15 +156,15 @@
       if (twin?.tagName === "INPUT") twin.value = node.value;
       else if (twin) twin.firstChild.data = node.value.replace("-", "−");
     } else if (node.dataset?.set) node.dataset.dirty = "1";
-    if (name && node.type === "range" && !known.drags && !name.startsWith("playback:")) {
+    if (name && node.type === "range" && !known.drags && !name.includes('"Scrub"')) {
       known.drags = true;
-      pending.push(["tab:hold", ""]);  // with the first value of the drag
+      pending.push(["", "hold"]);  // with the first value of the drag
     }
     if (name) send(name, valueOf(node));
   });
   // the end of a drag, by pointer or key: the drawing chooses its scales again
   const release = () => {
-    if (known.drags) send("tab:release");
+    if (known.drags) send("release");
     known.drags = false;
   };
   for (const type of ["keydown", "keyup", "blur"])
@@ -169,7 +175,7 @@
   shell.addEventListener("change", event => {
     const node = event.target;
     delete node.dataset?.dirty;
-    if (node.dataset?.set) send(node.dataset.set, valueOf(node));
+    if (node.dataset?.set && !node.dataset.enter) send(node.dataset.set, valueOf(node));
     if (!known.pressed) release();
     if (node.dataset?.set === AUTHOR) try { localStorage.setItem(AUTHOR_KEY, node.value); } catch { /* no storage */ }
   });
@@ -181,7 +187,7 @@
     }, true);
   shell.addEventListener("focusout", event => { delete event.target.dataset?.held; });
 
-  // --- a number that becomes a text box while it is edited: [data-box] is its event ----------------
+  // --- a number that becomes a text box while it is edited: [data-box] is its action ----------------
   const typeInto = text => {
     const box = Object.assign(document.createElement("input"),
       { className: "ws-box ws-typed", value: text.dataset.text, defaultValue: text.dataset.text });
@@ -200,7 +206,7 @@
     return box;
   };
 
-  // --- a list that is sorted again when pointer and focus leave it: [data-leave] is the event -------
+  // --- a list that is sorted again when pointer and focus leave it: [data-leave] is the action -------
   const leaveList = event => {
     const list = event.target.closest?.("[data-leave]");
     if (!list?.dataset.touched || list.contains(event.relatedTarget)) return;
@@ -262,20 +268,20 @@
     const writes = tagName === "TEXTAREA" || tagName === "SELECT"
       || tagName === "INPUT" && !["range", "checkbox", "radio"].includes(node.type);
     if (writes && !(event.ctrlKey || event.metaKey)) return;
-    const [name, value] = (known.keys[spelt(event)] ?? "").split("=");
-    if (!name || document.getElementById("ws-window").open && name !== "page:close") return;
-    if (writes && ["page:undo", "page:redo"].includes(name)) return;  // undo of the text box
+    const action = known.keys[spelt(event)];
+    if (!action || document.getElementById("ws-window").open && action !== "close_dialog") return;
+    if (writes && ["undo", "redo"].includes(action)) return;  // undo of the text box
     event.preventDefault();
     event.stopImmediatePropagation();
-    if (name === "find") document.querySelector("#ws-find")?.focus();
-    else if (name === "upload") chooseFiles(buttonOf(value));
-    else send(name, value);
+    if (action === "find_error") document.querySelector("#ws-find")?.focus();
+    else if (action === "choose_files") chooseFiles(buttonOf("files"));
+    else send(action);
   }, true);
   // a box with data-enter sends it on Enter; arrows move from it into the list below it
   shell.addEventListener("keydown", event => {
     const node = event.target;
     if (event.key === "Escape" && !node.dataset?.dirty && node.closest("#ws-notes"))
-      shell.querySelector("[data-do='notes:close']").click();
+      shell.querySelector("[data-do=close_notes]").click();
     if (node.dataset?.enter && event.key === "Enter") send(node.dataset.enter, node.value);
     const list = node.closest("[data-list]"), step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
     if (!list || !step) return;
@@ -287,13 +293,13 @@
     if (event.target.id === "ws-window") { event.preventDefault(); closeWindow(); }
   }, true);
 
-  // --- files: one event each, without content if the file is too large -----------------------------
+  // --- files: one action each, without content if the file is too large -----------------------------
   const sendFile = async ({ upload, most }, file) => {
     const reader = new FileReader();
     if (file.size <= Number(most))
       await new Promise(done => { reader.onload = done; reader.readAsDataURL(file); });
     const content = reader.result?.split(",")[1] ?? "";
-    post([[`${upload}:file`, `${file.size}\n${file.name}\n${content}`]]);
+    post([{ do: "Upload", panel: upload, name: file.name, size: file.size, content }]);
   };
   const sendFiles = (button, files) =>
     [...files].slice(0, MOST_FILES).forEach(file => sendFile(button.dataset, file));
@@ -390,11 +396,11 @@
       rename(tabName() || [...crypto.getRandomValues(new Uint8Array(16))]
         .map(byte => byte.toString(16).padStart(2, "0")).join(""));
       pending.splice(0);
-      send("tab:here", window.__warpspaceTab);
+      send({ do: "TabHere", token: window.__warpspaceTab });
       tidyAddress();
       const link = linkOf();
       known.hasLink = Boolean(link) && link !== (stored() || window.__warpspaceLink);
-      if (known.hasLink) { store(link); send("files:link", link); }
+      if (known.hasLink) { store(link); send({ do: "InputValue", input: "follow_link" }, link); }
     },
     // progress of the page, for tests
     stage(word) {
@@ -403,7 +409,7 @@
     },
     // report when everything before it is drawn
     drawn() {
-      const report = () => send("tab:drawn");
+      const report = () => send("drawn");
       if (document.hidden) setTimeout(report, 0);
       else requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(report, 0)));
     },
@@ -418,7 +424,7 @@
       const reach = "The link works on this computer only: it names this computer, not a server.";
       copyText(address.href, "Link copied", isLocal ? `${words}\n${reach}` : words);
     },
-    keys(events) { known.keys = events; },
+    keys(actions) { known.keys = actions; },
     // scroll to a note, after the list is opened
     reveal(id) { setTimeout(() => document.getElementById(id)?.focus(), 300); },
     show(pieces) { for (const [name, html] of Object.entries(pieces)) write(name, html); },

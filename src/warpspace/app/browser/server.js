@@ -75,7 +75,7 @@
       }
       const kept = read();
       if (kept?.text && !window.warpspacePage.hasLink())
-        window.warpspacePage.send("keeper:kept", kept.text);
+        window.warpspacePage.send({ do: "StoredCopy", text: kept.text });
       else if (was)
         say(BACK, ["The server was restarted or has discarded this tab, and no state was saved here."
           + " The scene was opened again."]);

@@ -19,13 +19,14 @@
   addEventListener("keydown", event => {
     if (!isPlaying() || event.ctrlKey || event.metaKey || event.altKey) return;
     const press = [" ", "Enter"].includes(event.key) && event.target.closest?.("button, a, summary");
-    const name = { ArrowRight: "on", " ": "on", ArrowLeft: "back", Escape: "end" }[event.key];
+    const action = { ArrowRight: "next_step", " ": "next_step", ArrowLeft: "previous_step",
+      Escape: "end_story" }[event.key];
     event.stopImmediatePropagation();  // hidden parts of the page must not react
-    if (press || !name) return;
+    if (press || !action) return;
     event.preventDefault();
-    page.send(`story:${name}`);
+    page.send(action);
   }, true);
   document.addEventListener("fullscreenchange", () => {  // for example with Esc
-    if (isPlaying() && !document.fullscreenElement) page.send("story:end");
+    if (isPlaying() && !document.fullscreenElement) page.send("end_story");
   });
 })();

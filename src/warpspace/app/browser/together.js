@@ -6,7 +6,7 @@
   const view = () => window.__viserMutable;
   const author = () => { try { return localStorage.getItem("warpspace-author") ?? ""; } catch { return ""; } };
 
-  const gone = () => { if (over) { over = false; warpspacePage.send("pointer:gone"); } };
+  const gone = () => { if (over) { over = false; warpspacePage.send("pointer_gone"); } };
   const move = event => {
     const { canvas, camera } = view() ?? {}, now = performance.now();
     if (!canvas || event.target !== canvas || event.buttons) { gone(); return; }
@@ -17,7 +17,7 @@
     const at = camera.position.clone().set(2 * (event.clientX - rect.left) / rect.width - 1,
       1 - 2 * (event.clientY - rect.top) / rect.height, 0.5).unproject(camera).sub(camera.position);
     const ray = [...warpspaceFly.back(camera.position.toArray()), ...warpspaceFly.back(at.normalize().toArray())];
-    warpspacePage.send("pointer:at", `${ray.map(x => x.toFixed(5)).join()}\n${author()}`);
+    warpspacePage.send({ do: "PointAt", ray: ray.map(x => Number(x.toFixed(5))), author: author() });
   };
 
   const draw = () => {

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from warpspace.app.browser.actions import Upload
 from warpspace.app.evaluation.compare import AFTER, BEFORE, drawn_tables, without_words
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Side
@@ -35,7 +36,6 @@ def unpack(word: str) -> str:
 
 _UNSAFE = re.compile(r"[^A-Za-z0-9._ -]+")
 LONGEST_NAME = 60
-LONGEST_SIZE = 16  # digits
 
 
 def safe_name(name: str, fallback: str = "scene") -> str:
@@ -58,17 +58,15 @@ IN_BOX = {"part": (".stl", ".obj", ".ply", ".glb"), "program": (".ngc", ".nc", "
 
 
 def read_upload(
-    value: str, most_bytes: int = MAX_SCENE_BYTES, what: str = "scene file"
+    upload: Upload, most_bytes: int = MAX_SCENE_BYTES, what: str = "scene file"
 ) -> tuple[str, bytes]:
     """Parse name and bytes of an uploaded file; a page omits the bytes of one too large."""
-    size_text, _, payload = value.partition("\n")
-    name, _, coded = payload.rpartition("\n")
-    name = safe_file_name(name)
+    name = safe_file_name(upload.name)
     try:
-        content = base64.b64decode(coded)
-        size = max(int(size_text[:LONGEST_SIZE]), len(content))
+        content = base64.b64decode(upload.content)
     except ValueError:
         raise OptionError(f"{name} was not received completely; try again") from None
+    size = max(upload.size, len(content))
     if size > most_bytes:
         raise OptionError(
             f"{name} is {size / 2**20:.1f} MB large; expected a {what} of at most"

@@ -19,9 +19,7 @@ from warpspace.units import Array
 TOP_PX = 46  # height of the bar at the top; the style sheet has it too
 PHONE_PX, COLUMNS_PX = 700, 558  # width of a phone at most, and of both columns elsewhere
 PHONE_SHARE = 0.52  # of the drawing, of a phone's height
-MOST_PX = 16_384
 LEAST_PX = 120
-LONGEST_WORD = 100
 HEADING_PX, FOOT_PX, LEGEND_PX = 66, 80, 134
 """Sizes of heading, controls and colour bar, until the page reports them."""
 WORDS_PX, PHONE_WORDS_PX = 46, 22
@@ -58,17 +56,6 @@ def first_room(page_width: float, page_height: float) -> Room:
     columns, share = (0, PHONE_SHARE) if page_width <= PHONE_PX else (COLUMNS_PX, 1.0)
     width, height = page_width - columns, page_height * share - TOP_PX
     return Room(max(width, LEAST_PX), max(height, LEAST_PX))
-
-
-def read_room(text: str) -> Room | None:
-    """Parse the size reported by a page; None where it is invalid."""
-    fields = text[:LONGEST_WORD].split(",")
-    if len(fields) != 6 or not all(word.isascii() and word.isdigit() for word in fields):
-        return None
-    width, height, top, bottom, right = (float(word[:6]) for word in fields[1:])
-    if not (LEAST_PX <= width <= MOST_PX and LEAST_PX <= height <= MOST_PX):
-        return None
-    return Room(width, height, top, bottom, right)
 
 
 # --- The camera -----------------------------------------------------------------------------------

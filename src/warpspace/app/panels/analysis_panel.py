@@ -12,16 +12,16 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 from markupsafe import Markup
 
 from warpspace.analysis.description import Analysis, Change, Result
 from warpspace.analysis.options import Option
 from warpspace.analysis.registry import Entry
+from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, field, join, tag, text_box
-from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
 from warpspace.app.evaluation import compare
 from warpspace.app.evaluation.cache import exclusive_work
@@ -36,6 +36,8 @@ from warpspace.app.panels.panel import (
     actions,
     alert,
     details,
+    later,
+    on,
     setting,
 )
 from warpspace.app.state.app_state import AppState
@@ -59,7 +61,7 @@ OF_STATE = frozenset({"loop", "placed", "limit_um"})  # options set once, for th
 QUICK_S = 1.0  # an analysis that takes less is repeated after each change
 MOST_STEPS = 4  # errors listed on a card
 SAME = 1e-3  # µm or µrad; smaller changes of an error are not listed
-RECORD = button("Record decision", "notes:decide",
+RECORD = button("Record decision", do.Signal.RECORD_DECISION,
                 hint="Record the change and its reason as a note")  # fmt: skip
 UNSET = ""  # value of an option that the analysis chooses
 EXAMPLES = {"X=..,Y=..": "X=0,B=30", "X,Y,Z": "100,0,50"}
@@ -161,8 +163,8 @@ class AnalysisPanel(Section):
         return result_html(block for block in result.blocks() if not isinstance(block, str))
 
     def actions(self, result: Result, *, stale: bool) -> Markup:
-        saves = [button(f"Save {end}", f"{self.name}:save", end) for end in _endings(result)]
-        saves.append(button("Add to report", f"{self.name}:report", kind="quiet"))
+        saves = [button(f"Save {end}", do.SaveResult(self.name, end)) for end in _endings(result)]
+        saves.append(button("Add to report", do.AddToReport(self.name), kind="quiet"))
         return actions(*saves)
 
     # --- the page --------------------------------------------------------------------------------
@@ -190,7 +192,7 @@ class AnalysisPanel(Section):
                 text = "Applied to the displayed machine. Undo reverts it."
                 parts += [tag("p", text, role="status"), RECORD]
             elif stale and not is_automatic:
-                text = "Out of date: inputs have changed. Run again."
+                text = "Out of date: inputs have changed. do.Run again."
                 parts.append(tag("p", text, class_="ws-stale"))
             result, faded = outcome.result, stale and key != self._applied_key
             content = join((self.headline(result), self.cards_html(key), self.result_html(result)))
@@ -201,7 +203,7 @@ class AnalysisPanel(Section):
         needs_run = outcome is None or problem or (stale and not is_automatic)
         if needs_run and is_ready and not bar:
             label = f"{self.run_label} again" if outcome else self.run_label
-            run = button(label, f"{self.name}:run", kind="" if outcome else "main",
+            run = button(label, do.Run(self.name), kind="" if outcome else "main",
                          hint=self.run_hint)  # fmt: skip
             bar = tag("div", run, class_="ws-actions ws-run")
         parts.append(bar)
@@ -215,13 +217,13 @@ class AnalysisPanel(Section):
         outcome, cards = self.outcome, list[Markup]()
         if outcome is None:
             return EMPTY
-        hints = {"Preview": "Compare the result with the current state",
-                 "Apply": "Change the errors; the current state becomes A"}  # fmt: skip
+        hints = {do.Preview: "Compare the result with the current state",
+                 do.Apply: "Change the errors; the current state becomes A"}  # fmt: skip
         for index in self.offered_changes(outcome.result):
             buttons = (
-                button(label, f"{self.name}:{label.lower()}", index, hint=hint,
-                       kind="main" if label == "Apply" else "", disabled=outcome.key != key)
-                for label, hint in hints.items()
+                button(kind.__name__, kind(self.name, index), hint=hint,
+                       kind="main" if kind is do.Apply else "", disabled=outcome.key != key)
+                for kind, hint in hints.items()
             )  # fmt: skip
             cards.append(tag("div", outcome.cards[index][1] + actions(*buttons), class_="ws-card"))
         return join(cards)
@@ -234,49 +236,59 @@ class AnalysisPanel(Section):
             return EMPTY
         values = self.values(state)
         form = controls + join(
-            _control(f"{self.name}:set.{option.name}", option, values.get(option.name), state.scene)
+            _control(
+                do.SetOption(self.name, option.name), option, values.get(option.name), state.scene
+            )
             for option in options
         )
         is_open, key = bool(self.problem_html(state)), f"{self.name}.options"
         return details("Options", form, open=is_open, data_key=key)
 
-    # --- events --------------------------------------------------------------------------------
+    # --- actions -------------------------------------------------------------------------------
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        name = action.removeprefix("set.")
-        if action.startswith("set.") and name in {option.name for option in self.options()}:
-            return replace(state, forms={**state.forms, f"{self.name}.{name}": value[:LONGEST]})
-        if action == "run" and self.is_ready(state):
-            self._run(state)
-        elif action == "cancel":
-            self._jobs.cancel()
-        elif action in ("save", "report"):
-            save = partial(self._save, value) if action == "save" else self._add_to_report
-            self.context.call_soon(save)
-        elif action in ("preview", "apply"):
-            change, title = self._change(state, value), self.title.lower()
-            if change is None:
-                return state
-            if action == "preview":
-                name = change.label if change.label.startswith("after ") else ""
-                return compare.with_proposal(
-                    state, change.scene, name or f"after {title}: {change.label}"
-                )
-            applied_state = compare.with_applied(state, change.scene, f"before {title}")
-            self._applied_key = self.result_key(applied_state)
-            description = change.label
-            if description.startswith("after "):
-                description = description.partition(": ")[2] or description
-            self.context.last_decision = state, f"{self.title}: {description}"
-            return applied_state
-        return state
-
-    def _change(self, state: AppState, value: str) -> Change | None:
-        outcome = self.outcome
-        if outcome is None or outcome.key != self.result_key(state):
+    @on(do.SetOption)
+    def set_option(self, state: AppState, action: do.SetOption) -> AppState | None:
+        name, text = action.option, action.value[:LONGEST]
+        if name not in {option.name for option in self.options()}:
             return None
-        index = index_of(value, len(outcome.cards))
-        return None if index is None else outcome.cards[index][0]
+        return replace(state, forms={**state.forms, f"{self.name}.{name}": text})
+
+    @on(do.Run)
+    def run(self, state: AppState, action: do.Run) -> None:
+        if self.is_ready(state):
+            self._run(state)
+
+    @later(do.Cancel)
+    def cancel(self, _: do.Cancel) -> None:
+        self._jobs.cancel()
+
+    @on(do.Preview)
+    def preview(self, state: AppState, action: do.Preview) -> AppState | None:
+        change = self._change(state, action.card)
+        if change is None:
+            return None
+        name = change.label if change.label.startswith("after ") else ""
+        name = name or f"after {self.title.lower()}: {change.label}"
+        return compare.with_proposal(state, change.scene, name)
+
+    @on(do.Apply)
+    def apply(self, state: AppState, action: do.Apply) -> AppState | None:
+        change = self._change(state, action.card)
+        if change is None:
+            return None
+        applied_state = compare.with_applied(state, change.scene, f"before {self.title.lower()}")
+        self._applied_key = self.result_key(applied_state)
+        description = change.label
+        if description.startswith("after "):
+            description = description.partition(": ")[2] or description
+        self.context.last_decision = state, f"{self.title}: {description}"
+        return applied_state
+
+    def _change(self, state: AppState, card: int) -> Change | None:
+        outcome = self.outcome
+        if outcome is None or outcome.key != self.result_key(state) or card >= len(outcome.cards):
+            return None
+        return outcome.cards[card][0]
 
     def _run(self, state: AppState) -> None:
         key, scenes = self.result_key(state), self.scenes(state)
@@ -328,25 +340,27 @@ class AnalysisPanel(Section):
         self.problem = (self.last_key, text)
         self.rerender()
 
-    def _save(self, ending: str) -> None:
+    @later(do.SaveResult)
+    def save(self, action: do.SaveResult) -> None:
         result = self.outcome.result if self.outcome else None
-        if result is None or ending not in _endings(result):
+        if result is None or action.format not in _endings(result):
             return
         text, table = io.StringIO(), result.file_table()
-        if ending == "JSON":
+        if action.format == "JSON":
             json.dump(result.as_json(), text, indent=2, ensure_ascii=False)
         elif table is not None:
             csv.writer(text, lineterminator="\n").writerows(table.csv_rows())
-        self.context.save_file(f"{self.name}.{ending.lower()}", text.getvalue())
+        self.context.save_file(f"{self.name}.{action.format.lower()}", text.getvalue())
 
-    def _add_to_report(self) -> None:
+    @later(do.AddToReport)
+    def add_to_report(self, _: do.AddToReport) -> None:
         if self.outcome is not None:
             title = self.kind.title or self.title
             self.context.report_results.append((title, self.outcome.result))
             self.context.notify("Added to the report", f"{title}; open Report in the top bar")
 
 
-def _endings(result: Result) -> tuple[str, ...]:
+def _endings(result: Result) -> tuple[Literal["CSV", "JSON"], ...]:
     return ("JSON",) if result.file_table() is None else ("CSV", "JSON")
 
 
@@ -375,7 +389,7 @@ def _change_html(state: AppState, change: Change) -> Markup:
     )
 
 
-def _control(name: str, option: Option, text: str | None, scene: Scene) -> Markup:
+def _control(name: do.SetOption, option: Option, text: str | None, scene: Scene) -> Markup:
     hint, default = f"{option.about}.", option.default_words
     metavar = option.grammar and option.grammar.metavar
     if option.kind is bool:

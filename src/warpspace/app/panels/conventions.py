@@ -12,9 +12,10 @@ from itertools import chain
 import numpy as np
 from markupsafe import Markup
 
+from warpspace.app.browser import actions as do
 from warpspace.app.browser.html import EMPTY, button, field, fill, join, number, tag, text_box
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.panel import Section, actions, details, tiny
+from warpspace.app.panels.panel import Section, actions, details, on, tiny
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import linear_spans
@@ -239,9 +240,7 @@ NOTE = (
     "Change of the error vector over the grid nodes, for the displayed loop: each choice alone,"
     " relative to the conventions of the scene."
 )
-RADIO = (
-    '<label><input type="radio" name="{}" value="{}"{} data-set="conventions:choose"> {}</label>'
-)
+RADIO = '<label><input type="radio" name="{}" value="{}"{} data-set="{}"> {}</label>'
 COST_NOTE = (
     "First-order effect of a wrong assumption about the measured data. The scene assumes squareness"
     " by the right-hand rule, measuring lines through the origin of each axis, straightness"
@@ -271,29 +270,43 @@ class ConventionsSection(Section):
             for choice, label in members.items():
                 checked = Markup(" checked") if choice in in_force else ""
                 title = f"{label} (scene)" if choice in scene_choices else label
-                radio = fill(RADIO, choice.partition("=")[0], choice, checked, title)
+                radio = fill(
+                    RADIO,
+                    choice.partition("=")[0],
+                    choice,
+                    checked,
+                    do.Input.CHOOSE_CONVENTION(),
+                    title,
+                )
                 lines.append(_row(radio, None if choice in scene_choices else effects[choice]))
         lines.append(_row("all choices together", effects["all"]))
-        reset = button("Reset to the scene", "conventions:own", disabled=in_force == scene_choices)
+        reset = button(
+            "Reset to the scene", do.Signal.RESET_CONVENTIONS, disabled=in_force == scene_choices
+        )
         return join((
             tag("table", join(lines), class_="ws-choices-table"), tiny(NOTE),
             _reference(state), actions(reset), _wrong(state),
         ))  # fmt: skip
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        if action == "choose":
-            return with_choice(state, value)
-        if action == "own":
-            return with_own_conventions(state)
-        if action == "pick" and state.picked is not None:
-            return with_reference(state, state.picked.at)
-        if action == "set.reference":
-            at = read_positions(value)
-            if at is not None:
-                return with_reference(state, at)
-            expected = f"expected axis positions, for example {EXAMPLE}"
-            return state.noted(f"point {value[:40]!r}: {expected}")
-        return state
+    @on(do.Input.CHOOSE_CONVENTION)
+    def choose(self, state: AppState, choice: str) -> AppState:
+        return with_choice(state, choice)
+
+    @on(do.Signal.RESET_CONVENTIONS)
+    def reset(self, state: AppState) -> AppState:
+        return with_own_conventions(state)
+
+    @on(do.Signal.USE_PICKED_REFERENCE)
+    def use_picked(self, state: AppState) -> AppState | None:
+        return None if state.picked is None else with_reference(state, state.picked.at)
+
+    @on(do.Input.SET_REFERENCE)
+    def set_reference(self, state: AppState, text: str) -> AppState:
+        at = read_positions(text)
+        if at is not None:
+            return with_reference(state, at)
+        expected = f"expected axis positions, for example {EXAMPLE}"
+        return state.noted(f"point {text[:40]!r}: {expected}")
 
 
 def _reference(state: AppState) -> Markup:
@@ -301,10 +314,12 @@ def _reference(state: AppState) -> Markup:
         return EMPTY
     positions = {**state.scene.workspace.positions, **state.scene.reference}
     text = " ".join(f"{axis} {positions[axis]:g}" for axis in linear_spans(state.scene))
-    name, hint = "conventions:set.reference", "First click a point of the volume"
+    name, hint = do.Input.SET_REFERENCE(), "First click a point of the volume"
     box = field("Reference point", text_box(name, text), name, hint="Axis positions")
     nowhere = state.picked is None or state.picked.point_mm is not None
-    pick = button("Use the clicked point", "conventions:pick", hint=hint, disabled=nowhere)
+    pick = button(
+        "Use the clicked point", do.Signal.USE_PICKED_REFERENCE, hint=hint, disabled=nowhere
+    )
     return box + actions(pick)
 
 

@@ -17,13 +17,14 @@ from warpspace.analysis.sampling.cases import Case, Reduction, SamplingPlan
 from warpspace.analysis.sampling.distribution import Distribution, Draws, Probability, Stream
 from warpspace.analysis.sampling.tolerance_search import Ensemble, build_ensemble
 from warpspace.analysis.sampling.worst_case import worst_case_um
+from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, fill, join, number, tag
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.machine_edits import library
 from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import histogram_html
-from warpspace.app.panels.panel import alert, quiet, setting, tiny
+from warpspace.app.panels.panel import alert, on, quiet, setting, tiny
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.leaf import Identity
@@ -152,18 +153,22 @@ class TolerancesPanel(AnalysisPanel):
         tolerance_rows = join(_row(state, key, shares[key], longest) for key in self._order[1])
         hint = "Scale all tolerances except fixed ones"
         scales = join(
-            button(label, f"{self.name}:scale", label, hint=hint) for label in SCALES
-        ) + button("As in the scene", f"{self.name}:reset", kind="quiet")
+            button(label, do.Input.SCALE_TOLERANCES(label), hint=hint) for label in SCALES
+        ) + button("As in the scene", do.Signal.RESET_TOLERANCES, kind="quiet")
         return tag("h4", "Half-widths and shares of the variance") + tolerance_rows + tag(
             "div", scales, class_="ws-actions", role="group", aria_label="Scale all tolerances"
         )  # fmt: skip
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        if action == "scale" and value in SCALES:
-            return edits.with_scaled_tolerances(state, self._order[1], SCALES[value])
-        if action == "reset":
-            return edits.with_scene_tolerances(state)
-        return super().handle(state, action, value)
+    @on(do.Input.SCALE_TOLERANCES)
+    def scale(self, state: AppState, label: str) -> AppState | None:
+        factor = SCALES.get(label)
+        if factor is None:
+            return None
+        return edits.with_scaled_tolerances(state, self._order[1], factor)
+
+    @on(do.Signal.RESET_TOLERANCES)
+    def reset(self, state: AppState) -> AppState:
+        return edits.with_scene_tolerances(state)
 
 
 def _controls(state: AppState, *names: str) -> Markup:
@@ -173,20 +178,22 @@ def _controls(state: AppState, *names: str) -> Markup:
 def _row(state: AppState, key: str, share: float, longest: float) -> Markup:
     row, span = parameter(key), edits.half_width_span(state, key)
     width, is_fixed = edits.half_width_of(state, key), key in state.specification.fixed
-    name = f"state:set.tolerances.{key}"
+    name = do.SetLeaf(f"tolerances.{key}")
     return fill(
-        '<div class="ws-tolerance" data-key="{name}"><div><span><b>{code}</b> {words}</span>'
-        '<span>{share} %</span></div><div class="ws-effect"><i style="width:'
-        '{length}%"></i></div><div class="ws-error-set">{slider}±{box}<span class="ws-unit">'
+        '<div class="ws-tolerance" data-key="tolerances.{code}"><div>'
+        "<span><b>{code}</b> {words}</span><span>{share} %</span></div>"
+        '<div class="ws-effect"><i style="width:{length}%"></i></div>'
+        '<div class="ws-error-set">{slider}±{box}<span class="ws-unit">'
         "{unit}</span>{fixed}</div></div>",
-        name=name, code=key, words=row.name, share=number(100.0 * share),
+        code=key, words=row.name, share=number(100.0 * share),
         length=f"{100.0 * share / longest:.1f}", unit=row.unit,
         slider=html.slider(name, width, span.low, span.high, span.step, twin=name,
                       label=f"Half-width of {key}", text=f"±{width:g} {row.unit}"),
         box=html.text_box(name, spell_typed(width), label=f"Half-width of {key} in {row.unit}",
                      size="short", inputmode="decimal"),
-        fixed=button("fixed" if is_fixed else "fix", "state:set.specification.fixed",
-                     f"{'-' if is_fixed else '+'}{key}", kind="link", pressed=is_fixed,
+        fixed=button("fixed" if is_fixed else "fix",
+                     do.SetLeaf("specification.fixed", f"{'-' if is_fixed else '+'}{key}"),
+                     kind="link", pressed=is_fixed,
                      aria_label=f"Fix the tolerance of {key}",
                      hint="A fixed tolerance is neither allocated nor scaled"),
     )  # fmt: skip
@@ -310,9 +317,9 @@ class ConceptsPanel(AnalysisPanel):
         offers, lines = self.offers(state), list[tuple[Markup, Markup]]()
         chosen = [key for key in self.chosen(state) if key in offers]
         for letter, key in zip(ascii_uppercase, chosen, strict=False):
-            open_button = button("Open", f"{self.name}:open", key, kind="link",
+            open_button = button("Open", do.Input.OPEN_CONCEPT(key), kind="link",
                                  hint="Open this machine", aria_label=f"Open {key}")  # fmt: skip
-            remove_button = button("✕", f"{self.name}:remove", key, kind="link", hint="Remove",
+            remove_button = button("✕", do.Input.REMOVE_CONCEPT(key), kind="link", hint="Remove",
                              aria_label=f"Remove {key}")  # fmt: skip
             if key == PRESENT:
                 title, buttons = state.scene.title, remove_button
@@ -320,7 +327,7 @@ class ConceptsPanel(AnalysisPanel):
                 title, buttons = key, open_button + remove_button
             lines.append((tag("b", f"{letter} ") + title, buttons))
         remaining = {key: key for key in offers if key not in chosen}
-        add = html.choice(f"{self.name}:set.add", "", {"": ADD, **remaining},
+        add = html.choice(do.Input.ADD_CONCEPT(), "", {"": ADD, **remaining},
                      label="Compare with another machine")  # fmt: skip
         machines = html.rows(lines) if self.is_ready(state) else EMPTY
         return (add if len(chosen) < MOST_CONCEPTS else EMPTY) + machines
@@ -328,30 +335,36 @@ class ConceptsPanel(AnalysisPanel):
     def actions(self, result: Result, *, stale: bool) -> Markup:
         """Render the buttons below a result, the picture for a review first."""
         draws = self.context.services.draw_concepts is not None
-        sheet = (button("Picture", f"{self.name}:sheet", kind="main", disabled=stale,
+        sheet = (button("Picture", do.Signal.DRAW_CONCEPTS, kind="main", disabled=stale,
                         hint="One sheet with all machines at the same scale, with their statistics")
                  if draws else EMPTY)  # fmt: skip
         return sheet + super().actions(result, stale=stale)
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        chosen, offers = self.chosen(state), self.offers(state)
-        if action == "set.add" and value in offers and value not in chosen:
-            chosen = [*chosen, value][:MOST_CONCEPTS]
-        elif action == "remove" and value in chosen:
-            chosen.remove(value)
-        elif action == "open" and value in offers and value != PRESENT:
-            show = partial(self.context.show_opened, keeps_comparison=True)
-            self.context.call_soon(partial(show, start_state(offers[value]), None))
-            return state
-        elif action == "sheet":
-            self._draw(state)
-            return state
-        else:
-            return super().handle(state, action, value)
+    @on(do.Input.ADD_CONCEPT)
+    def add(self, state: AppState, title: str) -> AppState | None:
+        chosen, key = self.chosen(state), title
+        is_new = key in self.offers(state) and key not in chosen
+        return self._with(state, [*chosen, key][:MOST_CONCEPTS]) if is_new else None
+
+    @on(do.Input.REMOVE_CONCEPT)
+    def remove(self, state: AppState, title: str) -> AppState | None:
+        chosen = self.chosen(state)
+        remaining = [key for key in chosen if key != title]
+        return None if remaining == chosen else self._with(state, remaining)
+
+    def _with(self, state: AppState, chosen: list[str]) -> AppState:
         self.outcome = None  # other machines are compared
         return replace(state, forms={**state.forms, f"{self.name}.machines": "\n".join(chosen)})
 
-    def _draw(self, state: AppState) -> None:
+    @on(do.Input.OPEN_CONCEPT)
+    def open(self, state: AppState, title: str) -> None:
+        offers = self.offers(state)
+        if title in offers and title != PRESENT:
+            show = partial(self.context.show_opened, keeps_comparison=True)
+            self.context.call_soon(partial(show, start_state(offers[title]), None))
+
+    @on(do.Signal.DRAW_CONCEPTS)
+    def draw(self, state: AppState) -> None:
         draw, outcome = self.context.services.draw_concepts, self.outcome
         if draw is None or outcome is None:
             return

@@ -12,11 +12,12 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.blocks import Band, Curve, Lines
+from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, fill, join, tag
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import lines_html
-from warpspace.app.panels.panel import Context, Panel, Refresh, actions, quiet, tiny
+from warpspace.app.panels.panel import Context, Panel, Refresh, actions, on, quiet, tiny
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import amplitude_span
@@ -117,7 +118,7 @@ def curve_html(state: AppState, key: str, feedback: CurveEditFeedback | None) ->
     origin, is_edited = origin_words(state, key)
     reset = EMPTY
     if is_edited:
-        reset = button("Reset to the scene", f"errors:own.{key}", kind="link",
+        reset = button("Reset to the scene", do.EditCurve(key, "own"), kind="link",
                        hint="Restore value and curve of the scene")  # fmt: skip
     feedback = feedback or CurveEditFeedback(spell_rows(function), "", is_problem=False)
     return tag("div", join((
@@ -125,16 +126,17 @@ def curve_html(state: AppState, key: str, feedback: CurveEditFeedback | None) ->
         html.rows([("Origin", origin + reset)], "ws-origin"),
         _editor(row, function, feedback),
         actions(
-            button("Only this error", "state:set.exclusions.only", f"{'-' if only else '+'}{key}",
+            button("Only this error", do.SetLeaf("exclusions.only", f"{'-' if only else '+'}{key}"),
                    pressed=only, hint="Evaluate the machine with the errors selected here only"),
-            button("Exclude", "state:set.exclusions.excluded", f"{'-' if excluded else '+'}{key}",
+            button("Exclude", do.SetLeaf("exclusions.excluded", f"{'-' if excluded else '+'}{key}"),
                    pressed=excluded, hint="Evaluate the machine without this error"),
         ),
     )), class_="ws-error-more", data_key=f"more-{key}")  # fmt: skip
 
 
 def _editor(row: Parameter, function: ErrorFunction, feedback: CurveEditFeedback) -> Markup:
-    name, kind, columns = f"errors:rows.{row.key}", f"errors:kind.{row.key}", function.row_words
+    name, kind = do.EditCurve(row.key, "rows"), do.EditCurve(row.key, "kind")
+    columns = function.row_words
     titles = [Constant.title] if row.is_constant else kind_titles()
     if not function.edited_as_rows:
         titles.append(function.title)
@@ -156,24 +158,23 @@ def _editor(row: Parameter, function: ErrorFunction, feedback: CurveEditFeedback
     )  # fmt: skip
 
 
-def edit_curve(
-    state: AppState, command: str, key: str, value: str
-) -> tuple[AppState, CurveEditFeedback | None]:
+def edit_curve(state: AppState, action: do.EditCurve) -> tuple[AppState, CurveEditFeedback | None]:
     """Edit kind or rows of a curve, or reset it to the scene; return the feedback."""
-    span, present, feedback = state.axis_span(key), state.curve(key), None
+    key, value, feedback = action.key, action.value, None
+    span, present = state.axis_span(key), state.curve(key)
     try:
-        if command == "rows":
+        if action.edit == "rows":
             function, remarks = read_curve(type(present), value, span)
             if remarks:
                 message = " ".join(remarks)
                 feedback = CurveEditFeedback(spell_rows(function), message, is_problem=False)
-        elif command == "kind":
+        elif action.edit == "kind":
             kind = curve_kind(value)
             function = present if type(present) is kind else kind.from_curve(present, span)
         else:
             function = state.own_curves.get(key) or Constant(span)
     except (OptionError, UnknownNameError) as error:
-        text = value if command == "rows" else spell_rows(present)
+        text = value if action.edit == "rows" else spell_rows(present)
         return state, CurveEditFeedback(text, str(error), is_problem=True)
     return edits.with_curve(state, key, function), feedback
 
@@ -252,11 +253,11 @@ def describe_curve(name: str, unit: str, along: str, at: Array, value: Array) ->
 LONGEST_QUERY = 80
 FOLDED = "zero"  # section of the errors that are zero
 ALL_ERRORS = {
-    "reset": ("Reset to the scene", "Restore values and curves of the scene"),
-    "zero": ("Set all to zero", "Nominal machine"),
-    "include": ("Include all", "Cancel all “Only this error” and “Exclude”"),
+    do.Signal.RESET_ERRORS: ("Reset to the scene", "Restore values and curves of the scene"),
+    do.Signal.ZERO_ERRORS: ("Set all to zero", "Nominal machine"),
+    do.Signal.INCLUDE_ERRORS: ("Include all", "Cancel all “Only this error” and “Exclude”"),
 }
-"""Commands for all errors: label and hint, by action of the page."""
+"""Signals for all errors, with label and hint."""
 T = TypeVar("T")
 
 
@@ -288,7 +289,7 @@ class Ranking:
 class ErrorsPanel(Panel):
     """Search box, rows by effect, and a folded section of errors that are zero.
 
-    The ranking is renewed when focus and pointer leave the list (`sort`, sent by the page), or when
+    The ranking is renewed when focus and pointer leave the list (the page sends a signal), or when
     errors are changed elsewhere, so that no row moves away from the pointer.
     """
 
@@ -359,27 +360,39 @@ class ErrorsPanel(Panel):
             rows_html[key] = value, row_html
         return {f"error.{key}": rows_html[key][1] for key in ranking.order}
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        command, _, key = action.partition(".")
-        if command in ("set", "kind", "rows", "own") and key in state.amplitudes:
-            self._edited.add(key)
-            self._is_edit = True
-            if command == "set":
-                return put(state, f"amplitudes.{key}", value)
-            state, feedback = edit_curve(state, command, key, value)
-            self._feedback = {**self._feedback, key: feedback}
-            self.context.call_soon(self.rerender)  # also if the edit is refused
-            return state
-        if command == "sort":
-            self._ranking = None
-            self.context.call_soon(self.rerender)
-        if command == "find":
-            self._ranking = None
-            return replace(state, page=replace(state.page, query=value[:LONGEST_QUERY]))
-        if command == "row":
-            row = value if value in state.amplitudes and value != state.page.row else ""
-            return replace(state, page=replace(state.page, row=row))
+    @on(do.SetError)
+    def set_error(self, state: AppState, action: do.SetError) -> AppState | None:
+        if action.key not in state.amplitudes:
+            return None
+        self._edited.add(action.key)
+        self._is_edit = True
+        return put(state, f"amplitudes.{action.key}", action.value)
+
+    @on(do.EditCurve)
+    def edit_curve(self, state: AppState, action: do.EditCurve) -> AppState | None:
+        if action.key not in state.amplitudes:
+            return None
+        self._edited.add(action.key)
+        self._is_edit = True
+        state, feedback = edit_curve(state, action)
+        self._feedback = {**self._feedback, action.key: feedback}
+        self.context.call_soon(self.rerender)  # also if the edit is refused
         return state
+
+    @on(do.Signal.SORT_ERRORS)
+    def sort(self, state: AppState) -> None:
+        self._ranking = None
+        self.context.call_soon(self.rerender)
+
+    @on(do.Input.FIND_ERRORS)
+    def find(self, state: AppState, query: str) -> AppState:
+        self._ranking = None
+        return replace(state, page=replace(state.page, query=query[:LONGEST_QUERY]))
+
+    @on(do.Input.UNFOLD_ERROR)
+    def unfold(self, state: AppState, key: str) -> AppState:
+        row = key if key in state.amplitudes and key != state.page.row else ""
+        return replace(state, page=replace(state.page, row=row))
 
 
 def _list_html(state: AppState, ranking: Ranking) -> str:
@@ -393,7 +406,7 @@ def _list_html(state: AppState, ranking: Ranking) -> str:
         places = quiet("No matching errors.")
     elif zero:
         title = tag("div", f"{len(zero)} errors are zero",
-                    data_do="page:fold", data_value=FOLDED, id="ws-error-zero")  # fmt: skip
+                    data_do=do.Input.FOLD_SECTION(FOLDED), id="ws-error-zero")  # fmt: skip
         places += tag(
             "div", title, class_="ws-zero", role="treeitem", aria_labelledby="ws-error-zero",
             tabindex=-1 if listed else 0, aria_expanded=str(is_open).lower(),
@@ -405,19 +418,19 @@ def _list_html(state: AppState, ranking: Ranking) -> str:
     if state.exclusions:
         count = sum(not state.exclusions.active(key) for key in used)
         excluded = (f"{count} of {len(used)} errors excluded. ",
-                    button("Include all", "page:include", kind="link"))  # fmt: skip
+                    button("Include all", do.Signal.INCLUDE_ERRORS, kind="link"))  # fmt: skip
     find = html.text_box(
-        "errors:find", query, placeholder="Find an error  /", live=True, label="Find an error",
-        id="ws-find",
+        do.Input.FIND_ERRORS(), query, placeholder="Find an error  /", live=True,
+        label="Find an error", id="ws-find",
     )  # fmt: skip
     menu = EMPTY
     if state.exclusions or state.changed_keys or FOLDED in state.page.open:
-        buttons = join(button(label, f"page:{action}", kind="quiet", hint=hint)
-                       for action, (label, hint) in ALL_ERRORS.items())  # fmt: skip
+        buttons = join(button(label, signal, kind="quiet", hint=hint)
+                       for signal, (label, hint) in ALL_ERRORS.items())  # fmt: skip
         summary = tag("summary", "⋯", aria_label="All errors", title="All errors")
         menu = tag("details", summary + tag("div", buttons), class_="ws-menu")
     head = tag("div", find + menu, class_="ws-find")
-    body = tag("div", places, class_="ws-errors", data_leave="errors:sort")
+    body = tag("div", places, class_="ws-errors", data_leave=do.Signal.SORT_ERRORS)
     return head + quiet(join(excluded)) + body
 
 
@@ -435,9 +448,9 @@ def _row(
     row: Parameter, value: float, span: Span, effect: float | None, share: float, hint: str
 ) -> Markup:
     """Render the row of an error; an excluded one has no effect."""
-    key, name, text = row.key, f"errors:set.{row.key}", _short(value)
+    key, name, text = row.key, do.SetError(row.key), _short(value)
     return fill(
-        '<div class="{kind}" id="ws-error-{key}" data-do="errors:row" data-value="{key}"'
+        '<div class="{kind}" id="ws-error-{key}" data-do="{unfold}"'
         ' title="{symbol}, {title}: {quantity}"><span>{effect} µm</span><b>{key}</b> {title}</div>'
         '<div class="ws-effect"><i style="width:{share}%"></i></div>'
         '<div class="ws-error-set" title="{hint}">'
@@ -445,6 +458,7 @@ def _row(
         '<span class="ws-edit" id="ws-box-{key}" data-box="{name}" data-text="{typed}"'
         ' data-label="{key} in {unit}">{text}</span><span class="ws-unit">{unit}</span></div>',
         kind="ws-error-head off" if effect is None else "ws-error-head", key=key, name=name,
+        unfold=do.Input.UNFOLD_ERROR(key),
         symbol=row.symbol, quantity=row.kind.value, title=row.name, unit=row.unit,
         pictogram=row.name.partition(" ")[0],
         effect="–" if effect is None else html.number(effect), share=f"{100.0 * share:.1f}",

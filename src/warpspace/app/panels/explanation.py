@@ -9,6 +9,7 @@ from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.analysis.commands.contributions import PointContribution
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.analysis.uncertainty.propagation import NAMES
+from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, join, number, rows, signed, tag
 from warpspace.app.drawing.camera import fit_camera
@@ -23,9 +24,9 @@ from warpspace.app.evaluation.point_explanation import (
 )
 from warpspace.app.panels.analysis_panel import AnalysisPanel
 from warpspace.app.panels.block_html import block_html
-from warpspace.app.panels.panel import Section, actions, details, quiet, tiny
+from warpspace.app.panels.panel import Section, actions, details, on, quiet, tiny
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.tree import EXAMPLE, put
+from warpspace.app.state.tree import EXAMPLE
 from warpspace.field.evaluate import placed_words
 from warpspace.machine.axes import parameter
 from warpspace.picture import formatting
@@ -62,10 +63,10 @@ class WorstPanel(Section):
             return quiet("No errors: every point is at its nominal position.")
         explanation, controls = self._explain(picture), EMPTY
         if picture.state.picked is not None:
-            reset = button("Worst point", "worst:forget", kind="link",
+            reset = button("Worst point", do.Signal.FORGET_POINT, kind="link",
                           hint="Return to the worst point")  # fmt: skip
             hint = "Pin a note to this point (N)"
-            pin = button("Pin a note", "notes:pin", kind="link", hint=hint)
+            pin = button("Pin a note", do.Input.PIN_NOTE(), kind="link", hint=hint)
             controls = tag("p", join((_axes(explanation), " ", reset, " ", pin)))
         best = tag("div", "", data_piece="best")
         limit = picture.state.specification.limit_um
@@ -85,19 +86,22 @@ class WorstPanel(Section):
             self._explanation = picture, explanation
         return self._explanation[1]
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        if action == "set.at":
-            return put(state, "picked", value)
-        if action == "forget":
-            return point_explanation.with_picked(state, None)
-        if action == "lever" and value in state.amplitudes:
-            picture = self.context.picture
-            if state.picked is None and picture is not None:
-                state = point_explanation.with_picked(state, pick_worst(picture))
-            return replace(state, lever="" if value == state.lever else value)
-        if action == "back":
-            self.context.call_soon(self._show_lever)
-        return state
+    @on(do.Signal.FORGET_POINT)
+    def forget(self, state: AppState) -> AppState:
+        return point_explanation.with_picked(state, None)
+
+    @on(do.Input.SHOW_LEVER_OF)
+    def show_lever_of(self, state: AppState, key: str) -> AppState | None:
+        if key not in state.amplitudes:
+            return None
+        picture = self.context.picture
+        if state.picked is None and picture is not None:
+            state = point_explanation.with_picked(state, pick_worst(picture))
+        return replace(state, lever="" if key == state.lever else key)
+
+    @on(do.Signal.SHOW_LEVER)
+    def show_lever(self, state: AppState) -> None:
+        self.context.call_soon(self._show_lever)
 
     def _show_lever(self) -> None:
         picture, camera = self.context.picture, self.context.camera.remember()
@@ -163,7 +167,7 @@ def _uncertainty(explanation: PointExplanation, limit_um: float | None) -> Marku
 def _details(explanation: PointExplanation, lever: str) -> Markup:
     point, ranked = explanation.explanation, explanation.ranked
     lines: list[tuple[object, ...]] = [
-        (button(c.key, "worst:lever", c.key, kind="link", pressed=c.key == lever,
+        (button(c.key, do.Input.SHOW_LEVER_OF(c.key), kind="link", pressed=c.key == lever,
                 hint=f"{parameter(c.key).name}: draw its axis and lever arm"),
          c.along_um, *c.error_um)
         for c in ranked
@@ -177,14 +181,14 @@ def _details(explanation: PointExplanation, lever: str) -> Markup:
     place = formatting.spell_in_r(point.nominal_mm + explanation.shift_mm)
     tilt = number(float(np.linalg.norm(point.orientation_urad)))
     loop = formatting.LOOP_WORDS[explanation.loop]
-    box = html.text_box("worst:set.at", _axes(explanation), placeholder=EXAMPLE)
+    box = html.text_box(do.SetLeaf("picked"), _axes(explanation), placeholder=EXAMPLE)
     return tag("div", join((
-        html.field("Point", box, "worst:set.at",
+        html.field("Point", box, do.SetLeaf("picked"),
               hint="Axis positions; or click a point of the map or of a trace"),
         tiny(f"{place} mm · {loop} · tilt {tilt} µrad"),
         block_html(Table(columns, lines)), *(_lever(c) for c in ranked if c.key == lever),
         tiny(ELSEWHERE),
-        button("Copy", "worst:copied", kind="quiet", data_copy=f"key\talong\tx\ty\tz\n{copied}",
+        button("Copy", None, kind="quiet", data_copy=f"key\talong\tx\ty\tz\n{copied}",
                hint="Copy the table for a spreadsheet"),
     )))  # fmt: skip
 
@@ -194,7 +198,7 @@ def _lever(contribution: PointContribution) -> Markup:
     if row.is_rotation:
         arm = float(np.linalg.norm(np.cross(contribution.direction, contribution.lever_mm)))
         effect = f"× {number(arm, 0)} mm lever arm"
-    show = button("Show the whole lever arm", "worst:back", kind="link",
+    show = button("Show the whole lever arm", do.Signal.SHOW_LEVER, kind="link",
                   hint="Move the camera until axis, lever arm and volume are in view")  # fmt: skip
     text = f"{contribution.key}: {signed(contribution.value)} {row.unit} {effect} "
     return tag("p", join((text, show)))
@@ -208,26 +212,30 @@ class DistancePanel(AnalysisPanel):
         point, picture = point_explanation.awaited_form(state), self.context.picture
         drawn = picture and point_explanation.measure_distance(picture)
         hint = "Click two points of the map; a third one gives an angle"
-        buttons = [button("Pick points", f"{self.name}:pick", kind="main", hint=hint)]
+        buttons = [button("Pick points", do.Signal.PICK_POINTS, kind="main", hint=hint)]
         if point:
-            buttons = [button("Stop", f"{self.name}:stop")]
+            buttons = [button("Stop", do.Signal.STOP_PICKING)]
         if any(map(state.forms.get, POINTS)):
-            buttons.append(button("Clear", f"{self.name}:clear", kind="quiet",
+            buttons.append(button("Clear", do.Signal.CLEAR_POINTS, kind="quiet",
                                   hint="Remove the points"))  # fmt: skip
         if drawn:
-            buttons.append(button("Pin", "notes:pin", "\n".join(drawn[0].lines()),
+            buttons.append(button("Pin", do.Input.PIN_NOTE("\n".join(drawn[0].lines())),
                                   hint="Pin a note with these numbers"))  # fmt: skip
         status = tag("p", POINTS[point], role="status") if point else EMPTY
         return actions(*buttons) + status + tiny(without_words(state))
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        if action not in ("pick", "stop", "clear"):
-            return super().handle(state, action, value)
+    @on(do.Signal.PICK_POINTS)
+    def pick(self, state: AppState) -> AppState:
+        return replace(state, forms={**state.forms, **dict.fromkeys(POINTS, "")})
+
+    @on(do.Signal.STOP_PICKING)
+    def stop(self, state: AppState) -> AppState:
+        forms = {name: text for name, text in state.forms.items() if text or name not in POINTS}
+        return replace(state, forms=forms)
+
+    @on(do.Signal.CLEAR_POINTS)
+    def clear(self, state: AppState) -> AppState:
         forms = {name: text for name, text in state.forms.items() if name not in POINTS}
-        if action == "pick":
-            forms |= dict.fromkeys(POINTS, "")
-        elif action == "stop":
-            forms |= {name: state.forms[name] for name in POINTS if state.forms.get(name)}
         return replace(state, forms=forms)
 
 

@@ -5,18 +5,29 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import msgspec
 import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.description import Result
+from warpspace.app.browser import actions as do
 from warpspace.app.browser.html import button, choice, field, join, tag, text_box
-from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents import scene_file, transfers
 from warpspace.app.documents.offline_page import build_offline_html, build_story_html
 from warpspace.app.evaluation.compare import drawn_tables, without_table
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.panel import Context, Dialog, Job, Jobs, actions, quiet, setting
+from warpspace.app.panels.panel import (
+    Context,
+    Dialog,
+    Job,
+    Jobs,
+    actions,
+    later,
+    on,
+    quiet,
+    setting,
+)
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
@@ -61,10 +72,9 @@ class JobDialog(Dialog):
 
         self._jobs.start(name, work)
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        if action == "cancel":
-            self._jobs.cancel()
-        return state
+    @later(do.Cancel)
+    def cancel(self, _: do.Cancel) -> None:
+        self._jobs.cancel()
 
 
 class FilesDialog(JobDialog):
@@ -80,63 +90,53 @@ class FilesDialog(JobDialog):
         services = self.context.services
         figures = {"": "map as displayed"}
         figures |= {name: name.replace("-", " ") for name, _ in services.figures}
-        kinds = choice("state:set.page.figure", picture.state.page.figure, figures)
-        exports = (button(end[1:].upper(), "files:export", end, hint=hint)
+        kinds = choice(do.SetLeaf("page.figure"), picture.state.page.figure, figures)
+        exports = (button(end[1:].upper(), do.Input.EXPORT(end), hint=hint)
                    for end, hint in services.exports)  # fmt: skip
         link = (
             tag("h3", "Link"),
             tag("p", "This server requires a token. A link without the token works only for people"
                 " who have it; a link with the token gives everyone who has the link access."),
-            actions(button("Copy link", "files:share", "plain"),
-                    button("Copy link with token", "files:share", "token")),
+            actions(button("Copy link", do.Share("without_token")),
+                    button("Copy link with token", do.Share("with_token"))),
         )  # fmt: skip
         return join((
             tag("h3", "Scene"),
             tag("p", "Current errors, tolerances and machine, with display settings and camera."),
-            actions(button("Save scene (TOML)", "files:save", kind="main", hint="Ctrl+S")),
+            actions(button("Save scene (TOML)", do.Signal.SAVE_SCENE, kind="main", hint="Ctrl+S")),
             *(link if services.token else ()),
             tag("h3", "Picture"), quiet(transfers.exported_words(picture)),
-            actions(button("Save current view (PNG)", "files:view")),
-            field("Figure", kinds, "state:set.page.figure"),
-            actions(button("Save figure (PNG)", "files:figure")),
+            actions(button("Save current view (PNG)", do.Signal.SAVE_VIEW)),
+            field("Figure", kinds, do.SetLeaf("page.figure")),
+            actions(button("Save figure (PNG)", do.Signal.SAVE_FIGURE)),
             tag("h3", "Export"),
-            actions(button("Interactive page (HTML)", "files:page",
+            actions(button("Interactive page (HTML)", do.Signal.SAVE_PAGE,
                            hint="A single file that works offline"),
-                    *((button("Story (HTML)", "files:story", hint="Its steps in a single file"),)
+                    *((button("Story (HTML)", do.Signal.SAVE_STORY,
+                              hint="Its steps in a single file"),)
                       if story(picture.state.review) else ()), *exports),
             self._jobs.html(),
         ))  # fmt: skip
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        if action == "share" and self.context.services.token and not value:
+    @on(do.Share)
+    def share(self, state: AppState, action: do.Share) -> AppState | None:
+        if self.context.services.token and not action.kind:
             return replace(state, page=replace(state.page, window=self.name))
-        commands: dict[str, Callable[[], None]] = {
-            "file": partial(self._open, value),
-            "save": self._save,
-            "share": partial(self._share, with_token=value == "token"),
-            "link": partial(self._follow, value),
-            "figure": self._draw,
-            "view": self._view,
-            "page": self._page,
-            "story": self._story,
-            "export": partial(self._export, value),
-        }
-        if action in commands:
-            self.context.call_soon(commands[action])
-        return super().handle(state, action, value)
+        self.context.call_soon(partial(self._share, with_token=action.kind == "with_token"))
+        return None
 
     # --- open ------------------------------------------------------------------------------------
 
-    def _open(self, value: str) -> None:
-        name = value.partition("\n")[2].partition("\n")[0].lower()
+    @later(do.Upload)
+    def open(self, upload: do.Upload) -> None:
         for panel, endings in transfers.IN_BOX.items():
-            if name.endswith(endings):
-                self.context.send(f"{panel}:file", value)
+            if upload.name.lower().endswith(endings):
+                self.context.send(msgspec.structs.replace(upload, panel=panel))
                 return
-        self._uploads.start("Opening", partial(self._parse, value))
+        self._uploads.start("Opening", partial(self._parse, upload))
 
-    def _parse(self, value: str, job: Job) -> None:
-        name, content = transfers.read_upload(value)
+    def _parse(self, upload: do.Upload, job: Job) -> None:
+        name, content = transfers.read_upload(upload)
         notes, is_robot = list[str](), b"<robot" in content[:4096]
         if is_robot:
             text, notes = transfers.robot_text(name, content)
@@ -152,13 +152,15 @@ class FilesDialog(JobDialog):
             self.context.call_soon(partial(show, opened, camera))
             self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
 
-    def _follow(self, link: str) -> None:
+    @later(do.Input.FOLLOW_LINK)
+    def follow(self, link: str) -> None:
         opened = scene_file.open_link(transfers.unpack(link), self.context.scenes.fixed)
         self.context.show_opened(*opened)
 
     # --- save ------------------------------------------------------------------------------------
 
-    def _save(self) -> None:
+    @later(do.Signal.SAVE_SCENE)
+    def save(self) -> None:
         state, camera = self.context.state, self.context.camera.remember()
         text = self._alone_if_large(lambda state: scene_file.state_to_toml(state, camera))
         self.context.save_file(f"{transfers.safe_name(state.scene.name)}.toml", text)
@@ -201,13 +203,15 @@ class FilesDialog(JobDialog):
             self.context.notify("Comparison not included", str(error), "warning")
             return text
 
-    def _draw(self) -> None:
+    @later(do.Signal.SAVE_FIGURE)
+    def save_figure(self) -> None:
         draw, kind = self.context.services.draw_figure, self.context.state.page.figure
         kind = kind if kind in dict(self.context.services.figures) else ""
         ending = f"_{kind or 'figure'}.png"
         self.make("Figure", ending, lambda picture, job: draw(picture, kind, job))
 
-    def _view(self) -> None:
+    @later(do.Signal.SAVE_VIEW)
+    def save_view(self) -> None:
         client, camera = self.context.client, self.context.camera
 
         def draw(picture: LivePicture, job: Job) -> bytes:
@@ -220,18 +224,21 @@ class FilesDialog(JobDialog):
 
         self.make("Current view", "_view.png", draw, as_drawn=True)
 
-    def _page(self) -> None:
+    @later(do.Signal.SAVE_PAGE)
+    def save_page(self) -> None:
         toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
         build = partial(build_offline_html, provenance=toml, camera=self.context.camera.remember())
         self.make("Page", ".html", lambda picture, _: build(picture).encode(), as_drawn=True)
 
-    def _story(self) -> None:
+    @later(do.Signal.SAVE_STORY)
+    def save_story(self) -> None:
         toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
         about = without_table(self.context.state), toml, self.context.scenes.fixed
         self.make("Story", "_story.html", lambda *_: build_story_html(*about).encode(),
                   as_drawn=True)  # fmt: skip
 
-    def _export(self, ending: str) -> None:
+    @later(do.Input.EXPORT)
+    def export(self, ending: str) -> None:
         services = self.context.services
         if ending in dict(services.exports):
             self.make(ending[1:].upper(), ending,
@@ -269,41 +276,41 @@ class ReportDialog(JobDialog):
         limit_um = picture.state.specification.limit_um
         limit = "No limit is set" if limit_um is None else f"Limit: {limit_um:g} µm"
         added = [
-            tag("li", join((f"{title} ", button("Remove", "report:remove", index, kind="link"))))
+            tag(
+                "li", join((f"{title} ", button("Remove", do.RemoveFromReport(index), kind="link")))
+            )
             for index, (title, _) in enumerate(self.context.report_results)
         ]
         # the list of notes may hold a box for the same name
-        author = text_box("state:set.page.author", picture.state.page.author, id="ws-report-author")
+        author = text_box(
+            do.SetLeaf("page.author"), picture.state.page.author, id="ws-report-author"
+        )
         return join((
             tag("p", f"{subject} {limit}."),
             field("Author", author, "report.author"),
             setting(picture.state, "page.questions"),
-            actions(button("Write HTML", "report:write", ".html", kind="main",
+            actions(button("Write HTML", do.WriteReport(".html"), kind="main",
                            hint="A single page with a 3-D view; works offline"),
-                    button("Write PDF", "report:write", ".pdf", hint="For printing")),
+                    button("Write PDF", do.WriteReport(".pdf"), hint="For printing")),
             self._jobs.html(),
             tag("h3", "Contents"),
             tag("ul", join((*(tag("li", chapter) for chapter in ALWAYS), *added))),
             quiet("To add more results, use “Add to report” below a result."),
         ))  # fmt: skip
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        if action == "remove":
-            index = index_of(value, len(self.context.report_results))
-            if index is not None:
-                del self.context.report_results[index]
-                self.context.call_soon(self.rerender)
-        elif action == "write" and value in (".html", ".pdf"):
-            self.context.call_soon(partial(self._write, value))
-        return super().handle(state, action, value)
+    @later(do.RemoveFromReport)
+    def remove(self, action: do.RemoveFromReport) -> None:
+        del self.context.report_results[action.index : action.index + 1]
+        self.rerender()
 
-    def _write(self, ending: str) -> None:
+    @later(do.WriteReport)
+    def write(self, action: do.WriteReport) -> None:
         results: dict[str, Result] = {}
         for index, (title, added) in enumerate(self.context.report_results):
             results[f"{title} ({index + 1})" if title in results else title] = added
         page = self.context.state.page
         questions = tuple(filter(None, map(str.strip, page.questions.splitlines())))
-        about = page.author.strip(), questions, results, ending
+        about = page.author.strip(), questions, results, action.ending
 
         def write(picture: LivePicture, job: Job) -> bytes:
             content, missing = self.context.services.write_report(picture, *about, job)
@@ -311,4 +318,4 @@ class ReportDialog(JobDialog):
                 self.context.notify("Some figures are missing", "\n".join(missing), "warning")
             return content
 
-        self.make("Report", f"_report{ending}", write)
+        self.make("Report", f"_report{action.ending}", write)

@@ -6,7 +6,7 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 from markupsafe import Markup
 
@@ -15,12 +15,13 @@ from warpspace.analysis.commands.adjust import Adjust
 from warpspace.analysis.description import Analysis, Result
 from warpspace.analysis.options import Option
 from warpspace.analysis.registry import entries
+from warpspace.app.browser import actions as do
 from warpspace.app.browser.html import EMPTY, button, choice, join, tag
 from warpspace.app.evaluation.compare import pinned_side, with_before, without_table
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.analysis_panel import RECORD, AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import details_html, result_html
-from warpspace.app.panels.panel import Context, Refresh, actions, quiet
+from warpspace.app.panels.panel import Context, Refresh, actions, on, quiet
 from warpspace.app.state.app_state import AppState
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.compensate import Compensation
@@ -125,8 +126,15 @@ def _is_of_errors(picture: LivePicture) -> bool:
 MOST_POINTS = 101  # per axis on the page; the command accepts as many as the controller
 RESOLUTION_UM = 0.005  # a smaller residual, or one below the resolution of the file, is rounding
 STEM, DATE = "compensation", (1980, 1, 1, 0, 0, 0)  # the same table gives the same bytes
-MACHINE, COMPARISON, RESIDUAL = "machine", "comparison", "residual"
-BOXES = {MACHINE: "uncompensated", COMPARISON: "before and after", RESIDUAL: "residual error"}
+Box = Literal["machine", "comparison", "residual"]
+MACHINE: Box = "machine"
+COMPARISON: Box = "comparison"
+RESIDUAL: Box = "residual"
+BOXES: dict[Box, str] = {
+    MACHINE: "uncompensated",
+    COMPARISON: "before and after",
+    RESIDUAL: "residual error",
+}
 
 
 class CompensatePanel(AnalysisPanel):
@@ -164,7 +172,7 @@ class CompensatePanel(AnalysisPanel):
     def before_result(self, state: AppState) -> Markup:
         chosen = self.values(state).get("formats", "")
         names = {"": "Select controller …"} | _writable()
-        control = choice(f"{self.name}:set.formats", chosen, names, label="Controller")
+        control = choice(do.SetOption(self.name, "formats"), chosen, names, label="Controller")
         if chosen:
             return control
         return control + quiet("A compensation table for the controller, and the residual error.")
@@ -189,38 +197,50 @@ class CompensatePanel(AnalysisPanel):
         is_applicable = is_applicable_to(state, result.controller)
         disabled = {RESIDUAL} if _is_rounding(result) else set[str]()
         boxes = join(
-            button(label, f"{self.name}:box", key, pressed=key == box_of(state), kind="chip",
+            button(label, do.ShowBox(key), pressed=key == box_of(state), kind="chip",
                    disabled=not is_applicable or key in disabled,
                    hint="Residual below numerical resolution" if key in disabled else "")
             for key, label in BOXES.items()
         )  # fmt: skip
-        row = [button("Save table", f"{self.name}:table", kind="main", hint=hint)]
+        row = [button("Save table", do.Signal.SAVE_TABLE, kind="main", hint=hint)]
         if self.context.services.draw_compensation is not None:
-            event, about = f"{self.name}:maps", "Before, after and residual error"
-            row.append(button("Maps", event, "show", hint=about))
-            row.append(button("Save maps", event, "save", hint="One sheet for a report"))
-        row.append(button("Add to report", f"{self.name}:report", kind="quiet"))
+            row.append(button("Maps", do.DrawMaps(), hint="Before, after and residual error"))
+            row.append(button("Save maps", do.DrawMaps(save=True), hint="One sheet for a report"))
+        row.append(button("Add to report", do.AddToReport(self.name), kind="quiet"))
         row += [RECORD] if box_of(state) != MACHINE else []
         box_choice = tag("div", tag("span", "Map", class_="ws-quiet") + boxes,
                          class_="ws-actions", role="group", aria_label="Map")  # fmt: skip
         return actions(*row) + box_choice
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
+    @property
+    def _compensation(self) -> Compensation | None:
         result = self.outcome.result if self.outcome is not None else None
-        if action == "set.formats":
+        return result if isinstance(result, Compensation) else None
+
+    def set_option(self, state: AppState, action: do.SetOption) -> AppState | None:
+        if action.option == "formats":
             self.outcome = None  # a table for another controller
-        if not isinstance(result, Compensation) or action not in ("table", "box", "maps"):
-            return super().handle(state, action, value)
-        if action == "maps":
-            self._draw(result, dark=state.shown.dark, saves=value == "save")
-            return state
-        if action == "table":
+        return super().set_option(state, action)
+
+    @on(do.DrawMaps)
+    def draw_maps(self, state: AppState, action: do.DrawMaps) -> None:
+        if (result := self._compensation) is not None:
+            self._draw(result, dark=state.shown.dark, saves=action.save)
+
+    @on(do.Signal.SAVE_TABLE)
+    def save_table(self, state: AppState) -> AppState | None:
+        if (result := self._compensation) is not None:
             self.context.call_soon(partial(self.context.save_file, *packed(result)))
-        if not is_applicable_to(state, result.controller):
-            return state
+        return self.show_box(state, do.ShowBox(COMPARISON))
+
+    @on(do.ShowBox)
+    def show_box(self, state: AppState, action: do.ShowBox) -> AppState | None:
+        result = self._compensation
+        if result is None or not is_applicable_to(state, result.controller):
+            return None
         description = f"maximum residual error {result.after_statistics.max_um:.1f} µm"
         self.context.last_decision = without_table(state), f"{self.title}: {description}"
-        return with_box(state, COMPARISON if action == "table" else value, result.controller)
+        return with_box(state, action.box, result.controller)
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (*super().body_dependencies(picture), box_of(picture.state))

@@ -5,13 +5,14 @@ import io
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from itertools import starmap
 
 from markupsafe import Markup
 from PIL import Image
 
 from warpspace.analysis.axis_motion import AxisMotion, assemble_motion
+from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, fill, join, tag, text_box
 from warpspace.app.evaluation import machine_edits
@@ -40,7 +41,7 @@ class PositionsSection(panel.Section):
     def body(self, picture: LivePicture) -> Markup:
         state = picture.state
         axes, point_mm = standing(state)
-        copied = button("Copy", "positions:none", kind="link", hint="Copy the positions",
+        copied = button("Copy", None, kind="link", hint="Copy the positions",
                         data_copy=spell_at(axes))  # fmt: skip
         position = join(("Tool point: ", spell_point(axes, point_mm), " ", copied))
         is_open = state.machine.shown and check_meshes(state.scene.machine)
@@ -94,14 +95,15 @@ class RotarySection(panel.Section):
             return panel.quiet("This machine has no rotary axis.")
         if stage is not None:
             stage.followers[self.name] = self._follow
-        buttons = [button("Pause" if playing else f"Turn {axis}", "rotary:play",
+        buttons = [button("Pause" if playing else f"Turn {axis}", do.Signal.TURN_ROTARY,
                           hint="Animate the traced points")]  # fmt: skip
         if playing or position:
             hint = "Stop and return to the axis position"
-            buttons.append(button("Stop", "rotary:stop", hint=hint))
+            buttons.append(button("Stop", do.Signal.STOP_ROTARY, hint=hint))
         if axis in position and not playing:
-            hint, path = "Move the axis to the paused position", f"state:set.positions.{axis}"
-            buttons.append(button("Move axes here", path, round(position[axis]), hint=hint))
+            hint = "Move the axis to the paused position"
+            move = do.SetLeaf(f"positions.{axis}", str(round(position[axis])))
+            buttons.append(button("Move axes here", move, hint=hint))
         return join((
             panel.actions(*buttons),
             fill('<p data-piece="rotary.angle" class="ws-tiny"></p>'),
@@ -114,22 +116,28 @@ class RotarySection(panel.Section):
             text = ", ".join(f"{axis} = {at:.0f}°" for axis, at in stage.position.items())
             self.context.page.put({"rotary.angle": str(tag("span", text.replace("-", MINUS)))})
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        stage = self.context.stage
-        if action in ("play", "stop") and stage is not None:
-            on = None if action == "stop" else not stage.playing
-            self.context.call_soon(lambda: stage.play(on))
+    @panel.on(do.Signal.TURN_ROTARY)
+    def turn(self, state: AppState) -> None:
+        if self.context.stage is not None:
+            self._play(not self.context.stage.playing)
+
+    @panel.on(do.Signal.STOP_ROTARY)
+    def stop(self, state: AppState) -> None:
+        self._play(None)
+
+    def _play(self, on: bool | None) -> None:
+        if self.context.stage is not None:
+            self.context.call_soon(partial(self.context.stage.play, on))
             self.context.call_soon(self.rerender)
-        return state
 
 
 def _trace(picture: LivePicture) -> Markup:
     if not picture.state.shown.traces:
-        return panel.actions(button("Show traces", "state:set.shown.traces", "1", kind="main"))
+        return panel.actions(button("Show traces", do.SetLeaf("shown.traces", "1"), kind="main"))
     moved = picture.moved_traces
     if not moved:
         return panel.quiet(NOTHING_MOVED)
-    name, path = chosen_trace(picture), "state:set.rotary.chosen"
+    name, path = chosen_trace(picture), do.SetLeaf("rotary.chosen")
     chosen = html.field("Trace", html.choice(path, name, {trace: trace for trace in moved}), path)
     motions = {trace: motion_of(picture, moved[trace]) for trace in [*moved][:MOST_ROWS]}
     motion = motions[name] if name in motions else motion_of(picture, moved[name])
@@ -187,8 +195,8 @@ def _points(state: AppState, played: str) -> Markup:
     traced: list[Markup] = []
     for index, name in leaves(state)["rotary.off"].choices.items():
         on = index not in state.rotary.off
-        change = f"{'+' if on else '-'}{index}"
-        traced.append(button(f"Trace {name}", "state:set.rotary.off", change, pressed=on))
+        change = do.SetLeaf("rotary.off", f"{'+' if on else '-'}{index}")
+        traced.append(button(f"Trace {name}", change, pressed=on))
     parts = [panel.actions(*traced), panel.setting(state, "rotary.own_mm")]
     if len(state.positions) > 1:
         parts += [panel.setting(state, f"rotary.held.{axis}") for axis in state.position_spans]
@@ -196,8 +204,8 @@ def _points(state: AppState, played: str) -> Markup:
         high = min(high, low + 359.0)  # at most one revolution
         turns = range(math.ceil(low / 90.0), math.floor(high / 90.0) + 1)
         positions, hint = ",".join(str(90 * turn) for turn in turns), "While the other axis rotates"
-        path = f"state:set.rotary.held.{played}"
-        parts.append(button(f"Hold {played} at every 90°", path, positions, hint=hint))
+        hold = do.SetLeaf(f"rotary.held.{played}", positions)
+        parts.append(button(f"Hold {played} at every 90°", hold, hint=hint))
     return panel.details("Traced points and positions", *parts)
 
 
@@ -226,11 +234,11 @@ BODIES = (
     ' [bodies] X = "column.stl".'
 )
 MACHINE_BUTTONS = (
-    ("Another machine …", "page:open", "machines",
+    ("Another machine …", do.Input.OPEN_DIALOG("machines"),
      "Library machines with their errors"),
-    ("Default dimensions", "editor:do", "sizes",
+    ("Default dimensions", do.EditMachine("sizes"),
      "Default offsets, travels, directions and working volume for this chain"),
-    ("Reset to the scene", "editor:do", "own",
+    ("Reset to the scene", do.EditMachine("own"),
      "The machine as opened, with the errors of its axes"),
 )  # fmt: skip
 
@@ -242,11 +250,13 @@ class EditorSection(panel.Section):
     _refused = ("", "")  # rejected chain and error message
 
     def body(self, picture: LivePicture) -> Markup:
-        state, name = picture.state, "editor:set.chain"
+        state, name = picture.state, do.EditMachine("chain")
         chain, tables = state.scene.machine.chain, machine_edits.tables_of(state.scene)
         typed, problem = self._refused if self._refused[1] else (str(chain), "")
         box = text_box(name, typed, aria_invalid=str(bool(problem)).lower())
-        machine_buttons = (button(*arguments, hint=hint) for *arguments, hint in MACHINE_BUTTONS)
+        machine_buttons = (
+            button(label, action, hint=hint) for label, action, hint in MACHINE_BUTTONS
+        )
         return join((
             html.field("Chain", box, name, hint=CHAIN_HINT),
             panel.alert(problem) if problem else EMPTY,
@@ -257,16 +267,15 @@ class EditorSection(panel.Section):
             panel.actions(*machine_buttons),
         ))  # fmt: skip
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
+    @panel.on(do.EditMachine)
+    def edit(self, state: AppState, action: do.EditMachine) -> AppState:
         self._refused = ("", "")
-        if action == "do":
-            return machine_edits.with_word(state, value)
-        quantity = action.removeprefix("set.")
-        changed = machine_edits.with_word(state, f"{quantity} {value}")
+        word = action.edit if action.value is None else f"{action.edit} {action.value}"
+        changed = machine_edits.with_word(state, word)
         notes = changed.notes[len(state.notes) :]
-        if quantity == "chain" and notes and changed.scene is state.scene:
+        if action.edit == "chain" and notes and changed.scene is state.scene:
             message = "\n".join(notes).removesuffix(f"; {machine_edits.UNCHANGED}")
-            self._refused = value[:200], message
+            self._refused = (action.value or "")[:200], message
             self.context.call_soon(self.rerender)
             return state
         return changed
@@ -295,11 +304,13 @@ def _frame(state: AppState, tables: machine_edits.Tables, name: str) -> Markup:
             "turn": "Reverse direction",
             "remove": f"Remove {name}",
         }
-        buttons = [button(text, "editor:do", f"{command} {name}")
+        buttons = [button(text, do.EditMachine(f"{command} {name}"))
                    for command, text in labels.items()]  # fmt: skip
         if axis.is_linear:
             hint, pressed = "Gantry: two guides with independent errors", gantry is not None
-            guides = button("Two guides", "editor:do", f"gantry {name}", hint=hint, pressed=pressed)
+            guides = button(
+                "Two guides", do.EditMachine(f"gantry {name}"), hint=hint, pressed=pressed
+            )
             buttons.insert(-1, guides)
         lines += [*_guides(state, gantry), panel.actions(*buttons)]
     heading = fill("<b>{}</b> {}", name, about)
@@ -312,7 +323,7 @@ def _boxes(
     frame = command.partition(" ")[2]
     boxes: list[Markup] = []
     for index, (value, letter) in enumerate(zip(values, letters, strict=True)):
-        name = f"editor:set.{command} {index}"
+        name = do.EditMachine(f"{command} {index}")
         description = f"{label} of {frame}, {letter} in {unit}"
         box = text_box(name, spell_typed(value), label=description, inputmode="decimal")
         boxes.append(fill('<label for="{}">{}</label>{}', html.ident(name), letter, box))
@@ -334,7 +345,7 @@ def _guides(state: AppState, gantry: Gantry | None) -> list[Markup]:
     else:
         values = [round(value, 9) for value in errors]
         lines.append(_boxes(f"guide {name}", "Error of each guide", MICROMETRE, values, "12"))
-    across = button(f"Spaced along {gantry.across}", "editor:do", f"across {name}", kind="link",
+    across = button(f"Spaced along {gantry.across}", do.EditMachine(f"across {name}"), kind="link",
                     hint="Click to change the direction")  # fmt: skip
     return [*lines, across, panel.tiny(note)]
 
@@ -342,7 +353,7 @@ def _guides(state: AppState, gantry: Gantry | None) -> list[Markup]:
 def _bodies(bodies: dict[str, BodySource]) -> Markup:
     lines: list[Markup] = []
     for frame, source in bodies.items():
-        remove = button("Remove", "editor:do", f"mesh {frame}", kind="link",
+        remove = button("Remove", do.EditMachine(f"mesh {frame}"), kind="link",
                         aria_label=f"Remove the body of {frame}")  # fmt: skip
         lines.append(tag("p", join((tag("b", frame), " ", _source(source), " ", remove))))
     lines = [*(lines or [tag("p", "All bodies are generated automatically.")]), panel.tiny(BODIES)]
@@ -377,15 +388,16 @@ class MachinesDialog(panel.Dialog):
                 fill('<img src="{}" alt="" width="150">', thumbnail(name))
                 if thumbnail(name) else tag("i", "no picture"),
                 tag("b", scene.machine.title), tag("small", str(scene.machine.chain)),
-            )), type="button", data_do="machines:choose", data_value=name,
+            )), type="button", data_do=do.Input.CHOOSE_MACHINE(name),
                 aria_current="true" if name == present else None)
             for name, scene in machine_edits.library().items()
         ), class_="ws-gallery", data_list=True)  # fmt: skip
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        scene = machine_edits.library().get(value)
-        if action != "choose" or scene is None:
-            return state
+    @panel.on(do.Input.CHOOSE_MACHINE)
+    def choose(self, state: AppState, name: str) -> AppState | None:
+        scene = machine_edits.library().get(name)
+        if scene is None:
+            return None
         opened = machine_edits.with_library_scene(state, scene)
         self.context.call_soon(lambda: self.context.scenes.add(opened.origin) and None)
         return self.closed(replace(opened, page=state.page))

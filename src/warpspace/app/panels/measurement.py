@@ -11,10 +11,10 @@ from markupsafe import Markup
 from warpspace.analysis.blocks import Lines, Table
 from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.registry import Entry
+from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, choice, join, number, tag
 from warpspace.app.browser.html import field as labelled
-from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
 from warpspace.app.documents.transfers import read_upload
 from warpspace.app.drawing.around import residuals
@@ -23,7 +23,18 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import chosen_test, plan_test
 from warpspace.app.panels.analysis_panel import AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
-from warpspace.app.panels.panel import Context, Job, Jobs, actions, alert, details, quiet, tiny
+from warpspace.app.panels.panel import (
+    Context,
+    Job,
+    Jobs,
+    actions,
+    alert,
+    details,
+    later,
+    on,
+    quiet,
+    tiny,
+)
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import TEST, with_form
@@ -76,7 +87,7 @@ class FilesPanel(AnalysisPanel):
     def files_html(self) -> Markup:
         lines: list[tuple[Markup, Markup]] = []
         for index, file in enumerate(self.files):
-            remove = button("✕", f"{self.name}:remove", index, kind="link",
+            remove = button("✕", do.RemoveFile(self.name, index), kind="link",
                             aria_label=f"Remove {file.name}")  # fmt: skip
             lines.append((tag("span", file.name) + tag("small", f" {file.description}"), remove))
         problem = alert(self._upload_problem)
@@ -106,17 +117,19 @@ class FilesPanel(AnalysisPanel):
         self._upload_problem = error_words(error)
         self.rerender()
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        if action == "file":
-            self.receive(partial(read_upload, value, self.most_bytes, self.what))
-        elif action == "remove" and (index := index_of(value, len(self.files))) is not None:
-            self.files = (*self.files[:index], *self.files[index + 1 :])
-            self.context.call_soon(self.rerender)
-        else:
-            if action == "cancel":
-                self._uploads.cancel()
-            return super().handle(state, action, value)
-        return state
+    @later(do.Upload)
+    def upload(self, action: do.Upload) -> None:
+        self.receive(partial(read_upload, action, self.most_bytes, self.what))
+
+    @later(do.RemoveFile)
+    def remove_file(self, action: do.RemoveFile) -> None:
+        self.files = (*self.files[: action.index], *self.files[action.index + 1 :])
+        self.rerender()
+
+    @later(do.Cancel)
+    def cancel(self, _: do.Cancel) -> None:
+        self._uploads.cancel()
+        super().cancel(_)
 
 
 # --- Standard tests -------------------------------------------------------------------------------
@@ -159,7 +172,9 @@ class TestsPanel(FilesPanel):
         tests = [find_test(name) for name in bench_names()]
         names = {"": "Select a test …"}
         names |= {test.name: f"{test.title} ({test.standard})" for test in tests}
-        chooser = choice("test:choose", state.forms.get(TEST, ""), names, label="Standard test")
+        chooser = choice(
+            do.Input.CHOOSE_TEST(), state.forms.get(TEST, ""), names, label="Standard test"
+        )
         if kind is None:
             return chooser
         test = self._body(state)
@@ -170,7 +185,8 @@ class TestsPanel(FilesPanel):
         return join((
             chooser, test, self.files_html(),
             EMPTY if self.files else self.upload_html("Measured readings …"),
-            html.switch("test:path", "Show test path", on=state.forms.get("test.path") != "0",
+            html.switch(do.SetOption(TEST, "path"), "Show test path",
+                   on=state.forms.get("test.path") != "0",
                    hint="Nominal grey, actual coloured, with the exaggeration of the map"),
             details("Procedure", tag("div", about), kind="details", data_key="test.procedure"),
         ))  # fmt: skip
@@ -184,16 +200,20 @@ class TestsPanel(FilesPanel):
     def result_html(self, result: Result) -> Markup:
         return join(map(block_html, (*result.blocks_of(Lines), *result.blocks_of(Table))))
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        if action == "choose" and value in ("", *bench_names()):
-            self.outcome, self.files, self._upload_problem = None, (), ""
-            other_forms = {k: v for k, v in state.forms.items() if k.partition(".")[0] != TEST}
-            page = replace(state.page, task=self.task, open=state.page.open | {TEST})
-            state = replace(state, page=page, forms=other_forms | ({TEST: value} if value else {}))
-            return edits.with_sight(state, inside=bool(value))
-        if action == "path":
-            return with_form(state, "test.path", value)
-        return super().handle(state, action, value)
+    @on(do.Input.CHOOSE_TEST)
+    def choose(self, state: AppState, test: str) -> AppState | None:
+        if test not in ("", *bench_names()):
+            return None
+        self.outcome, self.files, self._upload_problem = None, (), ""
+        other_forms = {k: v for k, v in state.forms.items() if k.partition(".")[0] != TEST}
+        page = replace(state.page, task=self.task, open=state.page.open | {TEST})
+        state = replace(state, page=page, forms=other_forms | ({TEST: test} if test else {}))
+        return edits.with_sight(state, inside=bool(test))
+
+    def set_option(self, state: AppState, action: do.SetOption) -> AppState | None:
+        if action.option == "path":
+            return with_form(state, "test.path", action.value)
+        return super().set_option(state, action)
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
         return partial(self.set_files, (UploadedFile(name, decode_text(content, name)[0]),))
@@ -271,10 +291,10 @@ class CalibratePanel(FilesPanel):
         return join((
             self.files_html(), EMPTY if self.files else quiet(introduction),
             self.upload_html("Add readings …"),
-            choice("calibrate:bundled", "", bundled, label="Bundled readings"),
-            labelled("Kind", choice("calibrate:kind", name, kinds), "calibrate:kind",
-                     hint="Kind of the readings to be added"),
-            html.text_box("calibrate:test-options", options, label="Test options",
+            choice(do.Input.ADD_READINGS(), "", bundled, label="Bundled readings"),
+            labelled("Kind", choice(do.Input.SET_READING_KIND(), name, kinds),
+                     do.Input.SET_READING_KIND(), hint="Kind of the readings to be added"),
+            html.text_box(do.Input.SET_TEST_OPTIONS(), options, label="Test options",
                      placeholder="plane=XZ:radius=150") if name in bench_names() else EMPTY,
         ))  # fmt: skip
 
@@ -297,28 +317,35 @@ class CalibratePanel(FilesPanel):
         blocks = list(result.blocks())
         visible = [next(block for block in blocks if isinstance(block, Lines))]
         visible += [b for b in blocks if isinstance(b, Table) and len(b.columns) == 4]
-        arrows = labelled("Residual arrows", choice("calibrate:arrows", self._arrows, ARROWS),
-                          "calibrate:arrows",
+        show = do.Input.SHOW_RESIDUALS()
+        arrows = labelled("Residual arrows", choice(show, self._arrows, ARROWS), show,
                           hint="Observed − predicted at each reading, exaggerated")  # fmt: skip
         status = tiny(self._draw_arrows())
         folded = details_html(block for block in blocks if block not in visible)
         return join((arrows, status, *map(block_html, visible), folded))
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        if action == "kind":
-            self._next_kind = value if value in (*KINDS, *bench_names()) else ""
-        elif action == "test-options":
-            name = self._next_kind.partition(":")[0]
-            self._next_kind = f"{name}:{value.strip()[:LONGEST_KIND]}".strip(":")
-        elif action == "bundled" and value in bundled_data():
-            self.receive(lambda: (value, find_data(value).read_bytes()))
-        elif action == "arrows":
-            self._arrows = value if value in ARROWS else ""
-            state = edits.with_sight(state, inside=bool(self._arrows))
-        else:
-            return super().handle(state, action, value)
+    @later(do.Input.SET_READING_KIND)
+    def set_kind(self, kind: str) -> None:
+        self._next_kind = kind if kind in (*KINDS, *bench_names()) else ""
+        self.rerender()
+
+    @later(do.Input.SET_TEST_OPTIONS)
+    def set_test_options(self, options: str) -> None:
+        name = self._next_kind.partition(":")[0]
+        self._next_kind = f"{name}:{options.strip()[:LONGEST_KIND]}".strip(":")
+        self.rerender()
+
+    @later(do.Input.ADD_READINGS)
+    def add_bundled(self, name: str) -> None:
+        if name in bundled_data():
+            self.receive(lambda: (name, find_data(name).read_bytes()))
+            self.rerender()
+
+    @on(do.Input.SHOW_RESIDUALS)
+    def show_residuals(self, state: AppState, arrows: str) -> AppState:
+        self._arrows = arrows if arrows in ARROWS else ""
         self.context.call_soon(self.rerender)
-        return state
+        return edits.with_sight(state, inside=bool(self._arrows))
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
         text, _ = decode_text(content, name)

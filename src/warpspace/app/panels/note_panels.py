@@ -7,14 +7,14 @@ from dataclasses import replace
 from markupsafe import Markup
 
 from warpspace.analysis import note_tables
+from warpspace.app.browser import actions as do
 from warpspace.app.browser.html import EMPTY, button, fill, join, linked, tag, text_box
-from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents.offline_page import step_words
 from warpspace.app.documents.scene_file import reopened, view_of
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import explain_point, pick_worst, with_picked
-from warpspace.app.panels.panel import Panel, Refresh, actions, quiet, setting, tiny
+from warpspace.app.panels.panel import Panel, Refresh, actions, on, quiet, setting, tiny
 from warpspace.app.state.app_state import AppState, Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.tree import leaves, set_leaf, stored
@@ -50,7 +50,9 @@ class NotesPanel(Panel):
         restored = self._restored_view(state)
         if restored is not None:
             title, note_id, *_ = restored
-            leave = button("Back", "notes:back", kind="chip", hint="Return to the previous view")
+            leave = button(
+                "Back", do.Signal.LEAVE_NOTE_VIEW, kind="chip", hint="Return to the previous view"
+            )
             changed = tag("span", "", class_="ws-changed", data_piece=f"note.{note_id}.bar")
             bar = tag("p", join((title, leave, changed)), role="status", class_="ws-reopened")
         return {"notes": _list_html(state) if state.page.notes else EMPTY, "reopened": bar}
@@ -61,42 +63,71 @@ class NotesPanel(Panel):
             self._restored = None
         return self._restored
 
-    # --- events ----------------------------------------------------------------------------------
+    # --- actions ---------------------------------------------------------------------------------
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        command, _, note_id = action.partition(".")
-        match command, next((n for n in state.review if n.id == note_id), None):
-            case "open" | "close", None:
-                return _opened(state, LIST if command == "open" else "")
-            case "pin" | "decide", None:
-                return self._start_note(state, value, is_decision=command == "decide")
-            case "keep", edited:
-                return self._save_note(state, edited)
-            case "back", None if self._restored:
-                (*_, before, camera), self._restored = self._restored, None
-                self.context.move_camera(camera)
-                return replace(before, review=state.review, page=state.page, forms=state.forms)
-            case "at", None if index := index_of(value, len(state.review) + 1):
-                self.context.page.call("reveal", f"note-{state.review[index - 1].id}")
-                return _opened(state, LIST)
-            case "show", note if note:
-                return self._restore_view(state, note)
-            case _, None:
-                return state
-            case _, note:
-                return _update_note(state, note, command, value)
+    @on(do.Signal.OPEN_NOTES)
+    def open(self, state: AppState) -> AppState:
+        return _opened(state, LIST)
 
-    def _start_note(self, state: AppState, text: str, *, is_decision: bool) -> AppState:
-        """Open the form; for a decision, with a description of the last applied change."""
+    @on(do.Signal.CLOSE_NOTES)
+    def close(self, state: AppState) -> AppState:
+        return _opened(state, "")
+
+    @on(do.Input.PIN_NOTE)
+    def pin(self, state: AppState, text: str) -> AppState:
         self._before_decision = None
-        if is_decision and self.context.last_decision is not None:
-            self._before_decision, description = self.context.last_decision
-            return _opened(state, NEW, "decision", "whole", f"{description}\nReason: ")
         # a given text, such as a measured distance, refers to the whole volume
         return _opened(state, NEW, place="whole" if text else "point", text=text)
 
-    def _save_note(self, state: AppState, edited: Note | None) -> AppState:
+    @on(do.Signal.RECORD_DECISION)
+    def record_decision(self, state: AppState) -> AppState:
+        """Open the form with a description of the last applied change."""
+        if self.context.last_decision is None:
+            return self.pin(state, "")
+        self._before_decision, description = self.context.last_decision
+        return _opened(state, NEW, "decision", "whole", f"{description}\nReason: ")
+
+    @on(do.Signal.LEAVE_NOTE_VIEW)
+    def leave_view(self, state: AppState) -> AppState | None:
+        if self._restored is None:
+            return None
+        (*_, before, camera), self._restored = self._restored, None
+        self.context.move_camera(camera)
+        return replace(before, review=state.review, page=state.page, forms=state.forms)
+
+    @on(do.RevealNote)
+    def reveal(self, state: AppState, action: do.RevealNote) -> AppState | None:
+        if not 0 < action.number <= len(state.review):
+            return None
+        self.context.page.call("reveal", f"note-{state.review[action.number - 1].id}")
+        return _opened(state, LIST)
+
+    @on(do.EditNote)
+    def edit(self, state: AppState, action: do.EditNote) -> AppState | None:
+        note = _find_note(state, action.note)
+        return note and _update_note(state, note, action.edit)
+
+    @on(do.ChooseVersion)
+    def choose_version(self, state: AppState, action: do.ChooseVersion) -> AppState | None:
+        note = _find_note(state, action.note)
+        if note is None or action.index > len(note.versions):
+            return None
+        version, present = (note, *note.versions)[action.index], note.edited()
+        chosen = replace(version, replaces=present.replaces, versions=(), replies=note.replies)
+        return replace(state, review=with_note(state.review, chosen))
+
+    @on(do.ReplyToNote)
+    def reply(self, state: AppState, action: do.ReplyToNote) -> AppState | None:
+        note, text = _find_note(state, action.note), clean(action.value)
+        if note is None or not text:
+            return None
+        answered = note.answered(Reply(text[:MAX_NOTE_TEXT], _author(state)))
+        return replace(state, review=with_note(state.review, answered))
+
+    @on(do.Input.SAVE_NOTE)
+    def save(self, state: AppState, note_id: str) -> AppState:
         """Save an edit; or a new note with the current view and its numbers."""
+        edited = _find_note(state, note_id)
         text, kind = clean(state.page.note_text), state.page.note_kind
         if not 0 < len(text) <= MAX_NOTE_TEXT:
             return state.noted(f"a note needs a text of 1 to {MAX_NOTE_TEXT} characters")
@@ -126,7 +157,11 @@ class NotesPanel(Panel):
         on = picked.point_mm and NoteAnchor(str(picked.loop or state.loop), picked.point_mm)
         return at, on or None
 
-    def _restore_view(self, state: AppState, note: Note) -> AppState:
+    @on(do.Input.SHOW_NOTE)
+    def restore_view(self, state: AppState, note_id: str) -> AppState | None:
+        note = _find_note(state, note_id)
+        if note is None:
+            return None
         if not note.view:
             return with_picked(state, Picked.of_note(note))
         reopened_state, camera = reopened(state, note, self.context.scenes.fixed)
@@ -154,27 +189,23 @@ def _author(state: AppState) -> str:
     return one_line(clean(state.page.author))[:MOST_AUTHOR]
 
 
-def _update_note(state: AppState, note: Note, command: str, value: str) -> AppState:
-    versions, changed = (note, *note.versions), note
-    match command:
+def _find_note(state: AppState, note_id: str) -> Note | None:
+    return next((note for note in state.review if note.id == note_id), None)
+
+
+def _update_note(state: AppState, note: Note, edit: str) -> AppState:
+    match edit:
         case "delete":
             return replace(state, review=tuple(n for n in state.review if n is not note))
         case "edit":
             return _opened(state, note.id, note.kind, text=note.text)
-        case "take-back":
+        case "revert":
             return _revert_decision(state, note)
-        case "step":
-            return _move_step(state, note, value)
         case "status":
             changed = note.edited(status="done" if note.status == "open" else "open")
-        case "choose" if (index := index_of(value, len(versions))) is not None:
-            replaced_ids, replies = note.edited().replaces, note.replies
-            changed = replace(versions[index], replaces=replaced_ids, versions=(), replies=replies)
-        case "reply" if text := clean(value):
-            changed = note.answered(Reply(text[:MAX_NOTE_TEXT], _author(state)))
+            return replace(state, review=with_note(state.review, changed))
         case _:
-            pass
-    return replace(state, review=with_note(state.review, changed))
+            return _move_step(state, note, edit)
 
 
 def _move_step(state: AppState, note: Note, move: str) -> AppState:
@@ -231,14 +262,15 @@ NOTE_FACTS = note_tables.spell_place, note_tables.spell_numbers, note_tables.spe
 
 
 def _list_html(state: AppState) -> Markup:
-    close = button("✕", "notes:close", kind="quiet", hint="Close (Esc)",
-                   aria_label="Close the notes", data_go="[data-do='notes:open']")  # fmt: skip
-    pin = button("Pin a note", "notes:pin", kind="main", hint="Pin a note (N)")
+    close = button("✕", do.Signal.CLOSE_NOTES, kind="quiet", hint="Close (Esc)",
+                   aria_label="Close the notes",
+                   data_go=f"[data-do={do.Signal.OPEN_NOTES}]")  # fmt: skip
+    pin = button("Pin a note", do.Input.PIN_NOTE(), kind="main", hint="Pin a note (N)")
     edited, steps = state.page.notes, story(state.review)
     return join((
         tag("header", join((tag("h2", "Notes"), pin, close))),
         setting(state, "page.author"),
-        button("Play the story", "story:start") if steps else EMPTY,
+        button("Play the story", do.Signal.START_STORY) if steps else EMPTY,
         _form(state, "") if edited == NEW else EMPTY,
         *(_form(state, edited) if note.id == edited else _note_html(number, note, steps)
           for number, note in enumerate(state.review, 1)),
@@ -250,8 +282,8 @@ def _form(state: AppState, edited: str) -> Markup:
     names = ("kind", "text") if edited else ("kind", "place", "text")
     return tag("div", join((
         *(setting(state, f"page.note_{name}") for name in names),
-        actions(button("Save note", f"notes:keep.{edited}", kind="main"),
-                button("Cancel", "notes:open", kind="quiet")),
+        actions(button("Save note", do.Input.SAVE_NOTE(edited), kind="main"),
+                button("Cancel", do.Signal.OPEN_NOTES, kind="quiet")),
     )), class_="ws-card", data_key=f"note-{edited or NEW}")  # fmt: skip
 
 
@@ -266,9 +298,9 @@ def _note_html(number: int, note: Note, steps: Sequence[Note]) -> Markup:
     if note.versions:
         texts = [tag("p", "Conflicting edits: select one version.", class_="ws-stale")]
         for index, version in enumerate((note, *note.versions)):
-            select = button("Use this version", f"notes:choose.{note.id}", index)
+            select = button("Use this version", do.ChooseVersion(note.id, index))
             texts.append(_message_html(version) + actions(select))
-    reply = f"notes:set.reply.{note.id}"
+    reply = do.ReplyToNote(note.id)
     place = f" · step {steps.index(note) + 1}" if note.step else ""
     return tag("article", join((
         tag("h3", f"{number} · {note.kind}{place}"), *texts,
@@ -276,7 +308,7 @@ def _note_html(number: int, note: Note, steps: Sequence[Note]) -> Markup:
         tag("p", "", class_="ws-changed", data_piece=f"note.{note.id}"),
         *(tag("blockquote", _message_html(answer)) for answer in note.replies),
         text_box(reply, "", label=f"Reply to note {number}", placeholder="Reply",
-                 data_enter=f"notes:reply.{note.id}", maxlength=MAX_NOTE_TEXT),
+                 data_enter=reply, maxlength=MAX_NOTE_TEXT),
         _buttons(note, steps),
     )), class_=f"ws-note {note.status}", data_key=f"note-{note.id}", id=f"note-{note.id}",
         tabindex=-1)  # fmt: skip
@@ -287,22 +319,36 @@ def _buttons(note: Note, steps: Sequence[Note]) -> Markup:
     is_done, free = note.status == "done", not note.versions
     place, change = steps.index(note) if note.step else 0, free and note.change
     rows = (
-        ("Done", "status", "", "Mark as open" if is_done else "Mark as done", free),
-        ("Show", "show", "", "Restore view, errors and camera of the note", True),
-        ("Edit", "edit", "", "", free),
-        ("Delete", "delete", "", "", True),
-        ("Revert", "take-back", "", "Restore the values before this decision", change),
-        ("Add to story", "step", "add", "", free and not note.step),
-        ("↑", "step", "up", "Earlier in the story", free and place > 0),
-        ("↓", "step", "down", "Later in the story", free and note.step and note != steps[-1]),
-        ("Remove from story", "step", "out", "", free and note.step),
+        (
+            "Done",
+            do.EditNote(note.id, "status"),
+            "Mark as open" if is_done else "Mark as done",
+            free,
+        ),
+        ("Show", do.Input.SHOW_NOTE(note.id), "Restore view, errors and camera of the note", True),
+        ("Edit", do.EditNote(note.id, "edit"), "", free),
+        ("Delete", do.EditNote(note.id, "delete"), "", True),
+        (
+            "Revert",
+            do.EditNote(note.id, "revert"),
+            "Restore the values before this decision",
+            change,
+        ),
+        ("Add to story", do.EditNote(note.id, "add"), "", free and not note.step),
+        ("↑", do.EditNote(note.id, "up"), "Earlier in the story", free and place > 0),
+        (
+            "↓",
+            do.EditNote(note.id, "down"),
+            "Later in the story",
+            free and note.step and note != steps[-1],
+        ),
+        ("Remove from story", do.EditNote(note.id, "out"), "", free and note.step),
     )
     return actions(*(
-        button(label, f"notes:{command}.{note.id}", value, hint=hint,
-               kind="" if command == "status" else "link",
-               pressed=is_done if command == "status" else None,
+        button(label, action, hint=hint, kind="" if label == "Done" else "link",
+               pressed=is_done if label == "Done" else None,
                aria_label=hint if label in "↑↓" else None)
-        for label, command, value, hint, is_enabled in rows if is_enabled
+        for label, action, hint, is_enabled in rows if is_enabled
     ))  # fmt: skip
 
 
@@ -348,22 +394,35 @@ class StoryPanel(Panel):
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         return {"story": self._step_html}
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
+    @on(do.Signal.START_STORY)
+    def start(self, state: AppState) -> None:
         context, notes = self.context, story(state.review)
-        to = self._number + {"on": 1, "back": -1}.get(action, len(notes))
-        if action == "start" and not notes:
+        if not notes:
             context.notify("No story", "Add notes to the story first")
-        elif action == "start" and not self._step_html:
+        elif not self._step_html:
             self._camera = context.camera.remember()
             context.page.call("story", True)
             self._show_step(state, notes, 0)
-        elif self._step_html and action == "end":
-            self._step_html, context.story_state = EMPTY, None
-            context.page.call("story", False)
-            context.fly(self._camera, 0)
-        elif self._step_html and 0 <= to < len(notes):
+
+    @on(do.Signal.END_STORY)
+    def end(self, state: AppState) -> None:
+        if self._step_html:
+            self._step_html, self.context.story_state = EMPTY, None
+            self.context.page.call("story", False)
+            self.context.fly(self._camera, 0)
+
+    @on(do.Signal.NEXT_STEP)
+    def show_next(self, state: AppState) -> None:
+        self._step_by(state, 1)
+
+    @on(do.Signal.PREVIOUS_STEP)
+    def show_previous(self, state: AppState) -> None:
+        self._step_by(state, -1)
+
+    def _step_by(self, state: AppState, by: int) -> None:
+        notes, to = story(state.review), self._number + by
+        if self._step_html and 0 <= to < len(notes):
             self._show_step(state, notes, to)
-        return state
 
     def _show_step(self, now: AppState, notes: Sequence[Note], number: int) -> None:
         context, note, camera, problem = self.context, notes[number], None, ""
@@ -379,10 +438,10 @@ class StoryPanel(Panel):
         context.story_state = replace(story_state.without_notes(), page=before.page)
         self._number = number
         self._step_html = step_words(now.resulting_scene(), notes, number, problem) + actions(
-            button("←", "story:back", hint="Previous step (←)", aria_label="Previous step",
-                   disabled=number == 0),
-            button("→", "story:on", kind="main", hint="Next step (→)", aria_label="Next step",
-                   disabled=number == len(notes) - 1),
-            button("End", "story:end", hint="Return to the previous view (Esc)"),
+            button("←", do.Signal.PREVIOUS_STEP, hint="Previous step (←)",
+                   aria_label="Previous step", disabled=number == 0),
+            button("→", do.Signal.NEXT_STEP, kind="main", hint="Next step (→)",
+                   aria_label="Next step", disabled=number == len(notes) - 1),
+            button("End", do.Signal.END_STORY, hint="Return to the previous view (Esc)"),
         )  # fmt: skip
         context.fly(camera, GLIDE_MS)

@@ -6,15 +6,17 @@ from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
 
+import msgspec
 import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.uncertainty.propagation import NOT_STATED
+from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, field, fill, join, menu, number, tag, text_box
 from warpspace.app.browser.viser_private import queued
 from warpspace.app.documents import legend
-from warpspace.app.drawing.camera import read_room
+from warpspace.app.drawing.camera import Room
 from warpspace.app.drawing.labels import Label, axis_labels, note_labels, point_labels
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
@@ -22,7 +24,7 @@ from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.evaluation.point_explanation import explain_point, pick, pick_worst
 from warpspace.app.panels.conventions import with_travel
 from warpspace.app.panels.design import allowed_words
-from warpspace.app.panels.panel import Context, Panel, Refresh, setting, tiny
+from warpspace.app.panels.panel import Context, Panel, Refresh, later, on, setting, tiny
 from warpspace.app.panels.playback import share_words
 from warpspace.app.state.app_state import COMPARISON_VIEWS, COMPONENT_NAMES, NOBODY, AppState, Side
 from warpspace.app.state.leaf import Identity
@@ -63,7 +65,7 @@ def _rotary_offer(picture: LivePicture) -> Markup:
     axis = parameter(picture.state.page.row).axis if picture.state.page.row else ""
     if picture.is_rotary or not axis or is_linear(axis):
         return EMPTY
-    show = button("show its traces", "controls:drawing", "rotary", kind="link")
+    show = button("show its traces", do.ShowDrawing("rotary"), kind="link")
     return tag("p", join((f"{axis} is a rotary axis: ", show)))
 
 
@@ -81,7 +83,7 @@ class LegendPanel(Panel):
         if not picture.is_difference and not picture.is_rotary:
             share, kind = legend.within_limit_words(picture)
             name, limit = "specification.limit_um", spell_limit(picture.state)
-            box = text_box(f"state:set.{name}", limit, size="short", label="Limit", id="ws-limit")
+            box = text_box(do.SetLeaf(name), limit, size="short", label="Limit", id="ws-limit")
             body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
             limit_menu = menu(share, body, key="limit", hint="Change the limit", kind=kind)
         return {"head.kept": limit_menu, "legend": legend.legend_html(picture)}
@@ -137,11 +139,10 @@ class OverlayPanel(Panel):
         self._sent = facts
         return {}
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        room, context = read_room(value) if action == "size" else None, self.context
-        if room is not None:
-            context.call_soon(lambda: context.camera.take_room(room, context.picture))
-        return state
+    @later(do.Resize)
+    def resize(self, action: do.Resize) -> None:
+        room = Room(*map(float, msgspec.structs.astuple(action)))
+        self.context.camera.take_room(room, self.context.picture)
 
 
 def _facts(picture: LivePicture) -> dict[str, Any]:
@@ -194,13 +195,13 @@ def _label_json(label: Label) -> dict[str, Any]:
 # --- Shared review: pointers of other tabs --------------------------------------------------------
 
 INTERVAL_S = 0.08  # between two positions of a pointer; a page sends one each tenth of a second
-LONGEST_NAME, LONGEST_RAY = 24, 200  # characters
+LONGEST_NAME = 24  # characters
 MOST_QUEUED = 8  # messages waiting for a page; beyond that it is sent no pointers
 Tabs = Callable[[], Iterable[Context]]
 
 
 class PointerPanel(Panel):
-    """Pointer events: ``pointer:at`` with a ray of six numbers and a name."""
+    """Passes the pointer of this tab on to the other tabs."""
 
     name = "pointer"
 
@@ -209,26 +210,25 @@ class PointerPanel(Panel):
         self._tabs, self._last = tabs, 0.0
         context.page.call("together")
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        now, picture, at = time.monotonic(), self.context.picture, None
-        numbers, _, name = value.partition("\n")
-        if action == "at":
-            is_early = now - self._last < INTERVAL_S
-            if len(numbers) > LONGEST_RAY or is_early or self.context.story_state:
-                return state
-            try:
-                ray = np.array([float(text) for text in numbers.split(",")]).reshape(2, 3)
-            except ValueError:  # not six numbers; a ray that is not finite meets nothing
-                return state
-            self._last = now
-            picked = picture and pick(picture, ray[0] / SCENE_PER_MM, ray[1])
-            at = picked and (picked[1] * SCENE_PER_MM).round(4).tolist()
-        label = " ".join(name[:LONGEST_NAME].split())
+    @later(do.PointAt)
+    def point(self, action: do.PointAt) -> None:
+        now, picture = time.monotonic(), self.context.picture
+        if now - self._last < INTERVAL_S or self.context.story_state:
+            return
+        self._last, ray = now, np.array(action.ray).reshape(2, 3)
+        picked = picture and pick(picture, ray[0] / SCENE_PER_MM, ray[1])
+        self._send(action.author, picked and (picked[1] * SCENE_PER_MM).round(4).tolist())
+
+    @later(do.Signal.POINTER_GONE)
+    def hide(self) -> None:
+        self._send("", None)
+
+    def _send(self, author: str, at: list[float] | None) -> None:
+        label = " ".join(author[:LONGEST_NAME].split())
         for tab in self._tabs():
             is_free = tab.story_state is None and queued(tab.client) <= MOST_QUEUED
             if tab is not self.context and is_free:
                 tab.page.call("pointer", self.context.client.client_id, label, at)
-        return state
 
 
 # --- The toolbar: display of the volume, view direction -------------------------------------------
@@ -242,19 +242,24 @@ SWITCHES = (
 )  # fmt: skip
 
 
-def _picks(event: str, labels: Mapping[str, object], chosen: str, prefix: str = "") -> Markup:
+def _picks(
+    action: Callable[[Any], do.AnyAction],
+    labels: Mapping[str, object],
+    chosen: str,
+    prefix: str = "",
+) -> Markup:
     return tag("div", join(
-        button(text, event, prefix + key, pressed=prefix + key == chosen, kind="choice")
+        button(text, action(prefix + key), pressed=prefix + key == chosen, kind="choice")
         for key, text in labels.items()
     ), class_="ws-choices")  # fmt: skip
 
 
 def _leaf_picks(state: AppState, path: str) -> Markup:
-    return _picks(f"state:set.{path}", leaves(state)[path].choices, spell(state, path))
+    return _picks(partial(do.SetLeaf, path), leaves(state)[path].choices, spell(state, path))
 
 
 def chosen_map(state: AppState) -> str:
-    """Return the quantity that colours the map, as a value of the event ``controls:map``."""
+    """Return the quantity that colours the map, as in `ColourBy`."""
     chosen = f"{state.look.quantity}.{state.component}"
     is_set = state.specification.limit_um is not None
     return "limit" if is_set and state.look.pass_fail and chosen == "position.norm" else chosen
@@ -273,7 +278,7 @@ class ControlsPanel(Panel):
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         camera = self.context.camera
-        lens = html.switch("controls:set.lens", "Orthographic", on=camera.orthographic,
+        lens = html.switch(do.SetOrthographic(), "Orthographic", on=camera.orthographic,
                       hint="Parallel projection")  # fmt: skip
         triad = html.fill(
             '<svg data-piece="triad.axes" viewBox="-46 -46 92 92" aria-hidden="true"></svg>'
@@ -282,37 +287,45 @@ class ControlsPanel(Panel):
         menus = (_drawings(picture.state), _exaggeration(picture), _colours(picture), *of_volume)
         return {
             "controls": join(menus),
-            "triad": html.menu(triad, _picks("controls:view", VIEWS, camera.view) + lens,
+            "triad": html.menu(triad, _picks(do.ViewFrom, VIEWS, camera.view) + lens,
                                key="view", label="View from", kind="up",
                                hint="Machine axes; click to select a view direction"),
         }  # fmt: skip
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        context = self.context
-        if action == "map":
-            quantity, _, component = value.partition(".")
-            if value == "limit":
-                quantity, component = "position", "norm"
-            state = put(state, "look.pass_fail", str(int(value == "limit")))
-            state = put(state, "look.quantity", quantity)
-            return put(state, "component", component)
-        if action == "machine" and value in MACHINES:
-            machine = replace(state.machine, shown=value == "solid", ghost=value != "off")
-            return replace(state, machine=machine)
-        if action == "drawing" and value in DRAWINGS:
-            state = put(state, "look.drawing", value)
-            if value == "volume":
-                return state
-            opened = state.page.open | {"rotary"}
-            return replace(state, page=replace(state.page, task="machine", open=opened))
-        if action == "set.travel":
-            return with_travel(state, value)
-        view = value if action == "view" and value in VIEWS else None
-        lens = value == "1" if action == "set.lens" else None
-        if view is not None or lens is not None:
-            context.call_soon(lambda: context.fit_view(view, lens))
-            context.call_soon(self.rerender)
-        return state
+    @on(do.Input.COLOUR_BY)
+    def colour_by(self, state: AppState, quantity: str) -> AppState:
+        is_limit, (quantity, _, component) = quantity == "limit", quantity.partition(".")
+        if is_limit:
+            quantity, component = "position", "norm"
+        state = put(state, "look.pass_fail", str(int(is_limit)))
+        return put(put(state, "look.quantity", quantity), "component", component)
+
+    @on(do.ShowMachine)
+    def show_machine(self, state: AppState, action: do.ShowMachine) -> AppState:
+        shown, ghost = action.look == "solid", action.look != "off"
+        return replace(state, machine=replace(state.machine, shown=shown, ghost=ghost))
+
+    @on(do.ShowDrawing)
+    def show_drawing(self, state: AppState, action: do.ShowDrawing) -> AppState:
+        state = put(state, "look.drawing", action.value)
+        if action.value == "volume":
+            return state
+        opened = state.page.open | {"rotary"}
+        return replace(state, page=replace(state.page, task="machine", open=opened))
+
+    @on(do.Input.SET_TRAVEL)
+    def set_travel(self, state: AppState, direction: str) -> AppState:
+        return with_travel(state, direction)
+
+    @later(do.ViewFrom)
+    def view_from(self, action: do.ViewFrom) -> None:
+        self.context.fit_view(action.view)
+        self.rerender()
+
+    @later(do.SetOrthographic)
+    def set_orthographic(self, action: do.SetOrthographic) -> None:
+        self.context.fit_view(lens=action.value == "1")
+        self.rerender()
 
 
 def _drawings(state: AppState) -> Markup:
@@ -322,8 +335,8 @@ def _drawings(state: AppState) -> Markup:
     chosen = "rotary" if state.shows_rotary else "volume"
     radios = (
         fill('<label title="Draw the {title}"><input type="radio" name="drawing" value="{key}"'
-             '{checked} data-set="controls:drawing">{label}</label>',
-             title=label, key=key, label=label.capitalize(),
+             '{checked} data-set="{action}">{label}</label>',
+             title=label, key=key, action=do.ShowDrawing(), label=label.capitalize(),
              checked=Markup(" checked") if key == chosen else EMPTY)
         for key, label in DRAWINGS.items()
     )  # fmt: skip
@@ -335,9 +348,10 @@ def _exaggeration(picture: LivePicture) -> Markup:
     factors = {"auto": "auto", **{str(n): spell_factor(n) for n in FACTORS}}
     chosen = "auto" if state.exaggeration is None else f"{state.exaggeration:g}"
     label = "true scale" if picture.exaggeration == 1.0 else spell_factor(picture.exaggeration)
-    name = "state:set.exaggeration"
+    name = do.SetLeaf("exaggeration")
     box = text_box(name, f"{picture.exaggeration:.4g}", size="short")
-    body = field("Exaggeration ×", box, name) + _picks(name, factors, chosen)
+    picks = _picks(partial(do.SetLeaf, name.path), factors, chosen)
+    body = field("Exaggeration ×", box, name) + picks
     return html.menu(label, body, key="exaggeration", label=f"Exaggeration: {label}", kind="up",
                 hint="Display factor of the errors, 0.001 to 1 000 000")  # fmt: skip
 
@@ -355,11 +369,12 @@ def _colours(picture: LivePicture) -> Markup:
             if not picture.is_difference:
                 body += [tag("h3", title), tiny(text)]
             continue
-        body += [tag("h3", title), _picks("controls:map", names, chosen, f"{quantity}.")]
+        body += [tag("h3", title), _picks(do.Input.COLOUR_BY, names, chosen, f"{quantity}.")]
         if quantity == picture.quantity and chosen != "limit":
             label = names[state.component]
     is_set = state.specification.limit_um is not None
-    body.insert(2, _picks("controls:map", {"limit": limit}, chosen) if is_set else tiny(NO_LIMIT))
+    picks = _picks(do.Input.COLOUR_BY, {"limit": limit}, chosen)
+    body.insert(2, picks if is_set else tiny(NO_LIMIT))
     top = look.range_top if look.range_mode == "fixed" else picture.scale.high
     body += [tag("h3", "Colour range"), _leaf_picks(state, "look.range_mode"),
              setting(state, "look.range_top", text=f"{top:.4g}")]  # fmt: skip
@@ -378,7 +393,7 @@ def _surface(picture: LivePicture) -> Markup:
     body += [tag("h3", "Also show"), *(setting(state, path) for path in (*switches, "loop"))]
     if state.loop is Loop.RELATIVE:
         body.append(setting(state, "placed"))
-    direction, name = state.scene.model.direction, "controls:set.travel"
+    direction, name = state.scene.model.direction, do.Input.SET_TRAVEL()
     if state.scene.errors.has_directions or direction != TravelDirection.MEAN:
         directions = {str(travel): label for travel, label in DIRECTION_WORDS.items()}
         body.append(
@@ -392,7 +407,7 @@ def _surface(picture: LivePicture) -> Markup:
 def _machine(state: AppState) -> Markup:
     look = state.machine
     chosen = "solid" if look.shown else "ghost" if look.ghost else "off"
-    body = _picks("controls:machine", MACHINES, chosen)
+    body = _picks(do.ShowMachine, MACHINES, chosen)
     body += setting(state, "machine.bent") if look.shown else EMPTY
     return html.menu(f"machine: {chosen}", body, key="machine", kind="up",
                 hint="Display of the machine")  # fmt: skip
@@ -419,11 +434,11 @@ class ComparePanel(Panel):
         body = [
             field(title, html.choice(name, side, label), name)
             for title, name, side, label in (
-                ("A", "compare:set.a", comparison.a.title, titles),
-                ("B", "compare:set.b", b, {NOBODY: NOBODY, **titles}),
+                ("A", do.SetSide("a"), comparison.a.title, titles),
+                ("B", do.SetSide("b"), b, {NOBODY: NOBODY, **titles}),
             )
         ]
-        body.append(button("Set current errors as A", "compare:pin",
+        body.append(button("Set current errors as A", do.Signal.PIN_AS_A,
                            hint="Later changes belong to B"))  # fmt: skip
         if compared is not None:
             body += [setting(state, "comparison.ghost"), comparison_html(compared)]
@@ -432,22 +447,30 @@ class ComparePanel(Panel):
                 "compare": html.menu(label, join(body), key="compare", kind="up wide",
                                 hint="Compare two scenes, or errors before and after")}  # fmt: skip
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
+    @later(do.Signal.OPEN_COMPARISON)
+    def open(self) -> None:
+        self.context.page.call("menu", self.name)
+
+    @on(do.Signal.PIN_AS_A)
+    def pin(self, state: AppState) -> AppState:
+        return with_pin(state)
+
+    @on(do.Signal.END_COMPARISON)
+    def end(self, state: AppState) -> AppState:
+        return with_sides(state, state.comparison.a, None)
+
+    @on(do.SetSide)
+    def set_side(self, state: AppState, action: do.SetSide) -> AppState | None:
         """Set a side of the comparison; an unknown title is ignored."""
-        chosen, scene = state.comparison, self.context.scenes.get(value)
-        if action == "menu":
-            self.context.call_soon(partial(self.context.page.call, "menu", self.name))
-            return state
-        if action == "pin":
-            return with_pin(state)
-        if action == "leave" or (action == "set.b" and value == NOBODY):
-            return with_sides(state, chosen.a, None)
-        side = _own_sides(state).get(value)
+        chosen, scene = state.comparison, self.context.scenes.get(action.value)
+        if action == do.SetSide("b", NOBODY):
+            return self.end(state)
+        side = _own_sides(state).get(action.value)
         if side is None and scene is not None:
-            side = replace(scene_side(scene), title=value)
-        if side is None or action not in ("set.a", "set.b"):
-            return state
-        a, b = (side, chosen.b or Side()) if action == "set.a" else (chosen.a, side)
+            side = replace(scene_side(scene), title=action.value)
+        if side is None:
+            return None
+        a, b = (side, chosen.b or Side()) if action.side == "a" else (chosen.a, side)
         return with_sides(state, a, b)
 
 
@@ -462,10 +485,10 @@ def _sides(compared: Compared) -> Markup:
     hints = {"a": compared.titles[0], "b": compared.titles[1], "difference": difference}
     choices: list[Markup] = []
     for key, label in COMPARISON_VIEWS.items():
-        choices.append(button(label, "state:set.comparison.shown", key, kind="chip",
+        choices.append(button(label, do.SetLeaf("comparison.shown", key), kind="chip",
                               hint=hints[key], pressed=compared.view == key,
                               disabled=bool(compared.refused) and key == "difference"))  # fmt: skip
-    leave = button("✕", "compare:leave", kind="chip", hint="End the comparison",
+    leave = button("✕", do.Signal.END_COMPARISON, kind="chip", hint="End the comparison",
                    aria_label="End the comparison")  # fmt: skip
     return tag("div", join((*choices, leave)), role="group", aria_label="Displayed side")
 

@@ -9,6 +9,7 @@ from textwrap import shorten
 from markupsafe import Markup
 
 from warpspace.analysis.registry import entries
+from warpspace.app.browser import actions as do
 from warpspace.app.browser.html import EMPTY, button, join, rows, tag, text_box, upload_button
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import machine_editor, overlay
@@ -21,7 +22,17 @@ from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog, accepte
 from warpspace.app.panels.improve import AdjustPanel, BestPanel, CompensatePanel
 from warpspace.app.panels.measurement import CalibratePanel, TestsPanel
 from warpspace.app.panels.note_panels import NoteNumbersPanel, NotesPanel, StoryPanel
-from warpspace.app.panels.panel import Context, Dialog, Panel, Refresh, Section, details, quiet
+from warpspace.app.panels.panel import (
+    Context,
+    Dialog,
+    Panel,
+    Refresh,
+    Section,
+    details,
+    later,
+    on,
+    quiet,
+)
 from warpspace.app.panels.playback import PlaybackPanel
 from warpspace.app.panels.upload_panels import ImportPanel, PartPanel, ProgramPanel
 from warpspace.app.state.app_state import AppState, Exclusions
@@ -35,12 +46,13 @@ LONGEST_SENTENCE = 110
 
 
 class StatePanel(Panel):
-    """Events that set a leaf of the state: ``state:set.PATH``."""
+    """Sets any leaf of the state."""
 
     name = "state"
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        return put(state, action.removeprefix("set."), value)
+    @on(do.SetLeaf)
+    def set_leaf(self, state: AppState, action: do.SetLeaf) -> AppState:
+        return put(state, action.path, action.value)
 
 
 class TopPanel(Panel):
@@ -52,7 +64,7 @@ class TopPanel(Panel):
         store = self.context.store
         steps = (("Undo", "↶", store.undoes, "Ctrl+Z"), ("Redo", "↷", store.redoes, "Ctrl+Shift+Z"))
         history = (
-            button(sign, f"page:{label.lower()}", kind="quiet", aria_label=label, data_key=label,
+            button(sign, do.Signal(label.lower()), kind="quiet", aria_label=label, data_key=label,
                    hint=f"{label}: {description} ({keys})")
             for label, sign, description, keys in steps if description
         )  # fmt: skip
@@ -60,24 +72,25 @@ class TopPanel(Panel):
         state, title = picture.state, picture.state.origin.title or picture.state.origin.name
         count = sum(note.status == "open" for note in state.review)
         notes = [
-            button(f"Notes ({count})" if count else "Notes", "notes:open", kind="quiet",
+            button(f"Notes ({count})" if count else "Notes", do.Signal.OPEN_NOTES, kind="quiet",
                    data_key="notes", hint="Review notes; press N to pin one")
         ] if state.review or state.page.notes else []  # fmt: skip
         return {
             "top": join((
                 tag("strong", "warpspace", class_="ws-brand"),
-                button(title, "page:open", "scenes", kind="ws-scene",
+                button(title, do.Input.OPEN_DIALOG("scenes"), kind="ws-scene",
                        hint="Select another scene"),
                 upload_button("Open", "files", MAX_UPLOAD_BYTES, accepted_endings(), kind="quiet",
                               hint=hint),
-                button("Save", "page:open", "files", kind="quiet",
+                button("Save", do.Input.OPEN_DIALOG("files"), kind="quiet",
                        hint="Save scene, figures and exports"),
-                button("Share", "files:share", kind="quiet", hint="Copy a link to this view"),
-                button("Report", "page:open", "report", kind="quiet"),
+                button("Share", do.Share(), kind="quiet", hint="Copy a link to this view"),
+                button("Report", do.Input.OPEN_DIALOG("report"), kind="quiet"),
                 *notes,
                 tag("span", "", class_="ws-fill"),
                 *history,
-                button("?", "page:open", "help", kind="quiet", aria_label="Help", hint="Help (H)"),
+                button("?", do.Input.OPEN_DIALOG("help"), kind="quiet", aria_label="Help",
+                       hint="Help (H)"),
             ))
         }  # fmt: skip
 
@@ -95,18 +108,20 @@ class ScenesDialog(Dialog):
                 tag("small", shorten(re.split(r"\.\s", scene.description)[0].rstrip(" .\n"),
                                      LONGEST_SENTENCE, placeholder=" …"))
                 if scene.description else EMPTY,
-            )), type="button", data_do="scenes:choose", data_value=title,
+            )), type="button", data_do=do.Input.CHOOSE_SCENE(title),
                 aria_current="true" if scene is picture.state.origin else None)
             for title, scene in self.context.scenes.items()
         )  # fmt: skip
         hint = quiet("To open a file, use Open in the top bar, or drop it on the page.")
         return tag("div", join(scenes), class_="ws-list", data_list=True) + hint
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        if action != "choose" or value not in self.context.scenes:
-            return state
+    @on(do.Input.CHOOSE_SCENE)
+    def choose(self, state: AppState, title: str) -> AppState | None:
+        scene = self.context.scenes.get(title)
+        if scene is None:
+            return None
         # selecting the current scene resets it
-        return self.closed(replace(state.with_scene(self.context.scenes[value]), page=state.page))
+        return self.closed(replace(state.with_scene(scene), page=state.page))
 
 
 # --- Table of all commands, for the keys of the page and the help ---------------------------------
@@ -114,11 +129,10 @@ class ScenesDialog(Dialog):
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A command of the help and the keyboard: an event of the page, with its value."""
+    """A command of the help and the keyboard."""
 
     label: str
-    event: str
-    value: str = ""
+    action: do.AnyAction
     keys: tuple[str, ...] = ()  # in the notation of page.js, the most common one first
     search_terms: str = ""  # further words by which it is found
 
@@ -132,43 +146,49 @@ class Command:
 
 # Keys that change the model need a modifier. viser's camera uses A S D Q E.
 COMMANDS = (
-    Command("Undo", "page:undo", keys=("ctrl+z",)),
-    Command("Redo", "page:redo", keys=("ctrl+shift+z", "ctrl+y")),
-    Command("Open a file", "upload", "files", ("ctrl+o",)),
-    Command("Select a scene", "page:open", "scenes"),
-    Command("Save the scene", "files:save", keys=("ctrl+s",)),
-    Command("Save and export", "page:open", "files"),
-    Command("Copy a link to this view", "files:share"),
-    Command("Write a report", "page:open", "report"),
-    Command("Play the story", "story:start"),
-    Command("Pin a note", "notes:pin", keys=("n",)),
-    Command("Notes", "notes:open"),
-    Command("Compare two scenes", "compare:menu", search_terms="difference before after"),
-    Command("Find an error", "find", keys=("/",)),
-    Command("Fit the view", "page:fit", keys=("f",)),
-    Command("Component: magnitude of the error", "state:set.component", "norm", ("1",)),
-    Command("Component: along x", "state:set.component", "x", ("2",)),
-    Command("Component: along y", "state:set.component", "y", ("3",)),
-    Command("Component: along z", "state:set.component", "z", ("4",)),
-    Command("Exaggeration: automatic", "state:set.exaggeration", "auto", ("x",)),
-    Command("Exaggeration: true scale", "state:set.exaggeration", "1", ("t",)),
-    Command("Grid lines on or off", "page:toggle", "grid_lines", ("g",)),
-    Command("Nominal box on or off", "page:toggle", "ghost", ("b",)),
-    Command("Draw the volume", "controls:drawing", "volume", ("v",)),
-    Command("Draw the rotary axes", "controls:drawing", "rotary", ("r",), "table traces"),
-    Command("Play or pause the rotary axis", "playback:play", keys=("p",)),
-    Command("Rotary traces on or off", "page:toggle", "traces", ("c",)),
-    Command("Dark mode on or off", "page:toggle", "dark", ("m",)),
-    Command("Set all errors to zero", "page:zero", keys=("ctrl+alt+0",)),
-    Command("Reset all errors to the scene", "page:reset", keys=("ctrl+alt+r",)),
-    Command("Include all errors", "page:include", keys=("ctrl+alt+l",)),
-    Command("Help and all commands", "page:open", "help", ("ctrl+k", "h", "?", "shift+?")),
-    Command("First steps", "page:tour"),
+    Command("Undo", do.Signal.UNDO, keys=("ctrl+z",)),
+    Command("Redo", do.Signal.REDO, keys=("ctrl+shift+z", "ctrl+y")),
+    Command("Open a file", do.Signal.CHOOSE_FILES, ("ctrl+o",)),
+    Command("Select a scene", do.Input.OPEN_DIALOG("scenes")),
+    Command("Save the scene", do.Signal.SAVE_SCENE, keys=("ctrl+s",)),
+    Command("Save and export", do.Input.OPEN_DIALOG("files")),
+    Command("Copy a link to this view", do.Share()),
+    Command("Write a report", do.Input.OPEN_DIALOG("report")),
+    Command("Play the story", do.Signal.START_STORY),
+    Command("Pin a note", do.Input.PIN_NOTE(), keys=("n",)),
+    Command("Notes", do.Signal.OPEN_NOTES),
+    Command(
+        "Compare two scenes", do.Signal.OPEN_COMPARISON, search_terms="difference before after"
+    ),
+    Command("Find an error", do.Signal.FIND_ERROR, keys=("/",)),
+    Command("Fit the view", do.Signal.FIT_VIEW, keys=("f",)),
+    Command("Component: magnitude of the error", do.SetLeaf("component", "norm"), ("1",)),
+    Command("Component: along x", do.SetLeaf("component", "x"), ("2",)),
+    Command("Component: along y", do.SetLeaf("component", "y"), ("3",)),
+    Command("Component: along z", do.SetLeaf("component", "z"), ("4",)),
+    Command("Exaggeration: automatic", do.SetLeaf("exaggeration", "auto"), ("x",)),
+    Command("Exaggeration: true scale", do.SetLeaf("exaggeration", "1"), ("t",)),
+    Command("Grid lines on or off", do.Input.TOGGLE_DISPLAY("grid_lines"), ("g",)),
+    Command("Nominal box on or off", do.Input.TOGGLE_DISPLAY("ghost"), ("b",)),
+    Command("Draw the volume", do.ShowDrawing("volume"), ("v",)),
+    Command("Draw the rotary axes", do.ShowDrawing("rotary"), ("r",), "table traces"),
+    Command("Play or pause the rotary axis", do.Input.PLAY(), keys=("p",)),
+    Command("Rotary traces on or off", do.Input.TOGGLE_DISPLAY("traces"), ("c",)),
+    Command("Dark mode on or off", do.Input.TOGGLE_DISPLAY("dark"), ("m",)),
+    Command("Set all errors to zero", do.Signal.ZERO_ERRORS, keys=("ctrl+alt+0",)),
+    Command("Reset all errors to the scene", do.Signal.RESET_ERRORS, keys=("ctrl+alt+r",)),
+    Command("Include all errors", do.Signal.INCLUDE_ERRORS, keys=("ctrl+alt+l",)),
+    Command("Help and all commands", do.Input.OPEN_DIALOG("help"), ("ctrl+k", "h", "?", "shift+?")),
+    Command("First steps", do.Signal.START_TOUR),
 )
 
 
-def key_events() -> Mapping[str, str]:
-    return {key: f"{c.event}={c.value}".rstrip("=") for c in COMMANDS for key in c.keys}
+def key_actions() -> Mapping[str, str]:
+    return {key: str(command.action) for command in COMMANDS for key in command.keys}
+
+
+IN_PAGE = do.Signal.FIND_ERROR, do.Signal.CHOOSE_FILES
+"""Commands that a script of the page carries out."""
 
 
 FIRST_HELP = (
@@ -192,12 +212,12 @@ def _section_commands(sections: Iterable[Section]) -> Iterator[Command]:
     """List the commands that open a section of a task, or choose a standard test."""
     for section in sections:
         label = f"{TASKS[section.task]}: {section.title.lower()}"
-        place, terms = f"{section.task}.{section.name}", f"{section.name} {section.sentence}"
-        yield Command(label, "page:section", place, search_terms=terms.lower())
+        place, terms = (section.task, section.name), f"{section.name} {section.sentence}"
+        yield Command(label, do.OpenSection(*place), search_terms=terms.lower())
     for test in map(find_test, bench_names()):
         label = f"Standard test: {test.title.lower()}"
         terms = f"{test.name} {test.standard} {test.description}"
-        yield Command(label, "test:choose", test.name, search_terms=terms.lower())
+        yield Command(label, do.Input.CHOOSE_TEST(test.name), search_terms=terms.lower())
 
 
 class HelpDialog(Dialog):
@@ -223,12 +243,13 @@ class HelpDialog(Dialog):
     def body(self, picture: LivePicture) -> Markup:
         query, scene = picture.state.page.command, picture.state.scene
         label = "Find a command"
-        box = text_box("state:set.page.command", query, label=label, placeholder=label, live=True,
-                       data_enter="help:first", autofocus=True)  # fmt: skip
+        box = text_box(do.SetLeaf("page.command"), query, label=label, placeholder=label, live=True,
+                       data_enter=do.Input.RUN_FIRST_COMMAND(), autofocus=True)  # fmt: skip
         commands = join(
             tag("button", tag("kbd", command.key_label) + command.label, type="button",
-                data_do="help:run", data_value=command.label)
-            if ":" in command.event else tag("p", tag("kbd", command.key_label) + command.label)
+                data_do=do.Input.RUN_COMMAND(command.label))
+            if command.action not in IN_PAGE
+            else tag("p", tag("kbd", command.key_label) + command.label)
             for command in self._find_commands(query)
         ) or quiet(f"No command matches “{query}”.")  # fmt: skip
         about = " ".join(scene.description.split())
@@ -241,57 +262,91 @@ class HelpDialog(Dialog):
             *((tag("h3", scene.title), tag("p", about)) if about else ()),
         ))  # fmt: skip
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        query = state.page.command
-        matches = [command for command in self._find_commands(query) if ":" in command.event]
-        is_first = action == "first" and bool(query)
-        if action == "run":
-            matches = [command for command in matches if command.label == value]
-        if not matches or not (is_first or action == "run"):
-            return state
-        self.context.send(matches[0].event, matches[0].value)
+    @on(do.Input.RUN_COMMAND)
+    def run(self, state: AppState, label: str) -> AppState | None:
+        commands = self._find_commands(state.page.command)
+        return self._run(state, [c for c in commands if c.label == label])
+
+    @on(do.Input.RUN_FIRST_COMMAND)
+    def run_first(self, state: AppState, query: str) -> AppState | None:
+        return self._run(state, self._find_commands(query) if query else [])
+
+    def _run(self, state: AppState, commands: Iterable[Command]) -> AppState | None:
+        actions = [command.action for command in commands if command.action not in IN_PAGE]
+        if not actions:
+            return None
+        self.context.send(actions[0])
         return self.closed(state)
 
 
 class PagePanel(Panel):
-    """Events of the whole page: tasks, sections, dialogs, undo, redo, and all errors."""
+    """Actions of the whole page: sections, dialogs, undo, redo, and all errors."""
 
     name = "page"
     refresh = Refresh.IMMEDIATE
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        context.page.call("keys", key_events())
+        context.page.call("keys", key_actions())
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         # an open dialog renders its own content
         return {} if picture.state.page.window else {"window": ""}
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        context = self.context
-        actions: dict[str, Callable[[], None]] = {
-            "undo": partial(self._go, "undo", context.store.undo),
-            "redo": partial(self._go, "redo", context.store.redo),
-            "fit": context.fit_view,
-            "tour": partial(context.page.call, "tour", True),
-            "close": context.dialog_closed,
-        }
-        if action in actions:
-            context.call_soon(actions[action])
-        updates: dict[str, Callable[[], AppState]] = {
-            "task": partial(put, state, "page.task", value),
-            "fold": partial(toggled, state, "page.open", value),
-            "open": partial(put, put(state, "page.command", ""), "page.window", value),
-            "section": partial(_with_section, state, *value.partition(".")[::2]),
-            **dict.fromkeys(("close", "tour"), partial(put, state, "page.window", "")),
-            "include": partial(replace, state, exclusions=Exclusions()),
-            "zero": state.zeroed,
-            "reset": state.reset,
-        }
-        is_on = getattr(state.shown, value, None) if action == "toggle" else None
-        if isinstance(is_on, bool):
-            return replace(state, shown=replace(state.shown, **{value: not is_on}))
-        return updates[action]() if action in updates else state
+    @later(do.Signal.UNDO)
+    def undo(self) -> None:
+        self._go("undo", self.context.store.undo)
+
+    @later(do.Signal.REDO)
+    def redo(self) -> None:
+        self._go("redo", self.context.store.redo)
+
+    @later(do.Signal.FIT_VIEW)
+    def fit_view(self) -> None:
+        self.context.fit_view()
+
+    @on(do.Signal.START_TOUR)
+    def start_tour(self, state: AppState) -> AppState:
+        self.context.call_soon(partial(self.context.page.call, "tour", True))
+        return put(state, "page.window", "")
+
+    @on(do.Signal.CLOSE_DIALOG)
+    def close_dialog(self, state: AppState) -> AppState:
+        self.context.call_soon(self.context.dialog_closed)
+        return put(state, "page.window", "")
+
+    @on(do.Input.OPEN_DIALOG)
+    def open_dialog(self, state: AppState, name: str) -> AppState:
+        return put(put(state, "page.command", ""), "page.window", name)
+
+    @on(do.Input.FOLD_SECTION)
+    def fold_section(self, state: AppState, section: str) -> AppState:
+        return toggled(state, "page.open", section)
+
+    @on(do.OpenSection)
+    def open_section(self, state: AppState, action: do.OpenSection) -> AppState:
+        state = put(put(state, "page.task", action.task), "page.window", "")
+        opened = state.page.open | {action.section}
+        return replace(state, page=replace(state.page, open=opened))
+
+    @on(do.Input.TOGGLE_DISPLAY)
+    def toggle_display(self, state: AppState, option: str) -> AppState | None:
+        is_on = getattr(state.shown, option, None)
+        if not isinstance(is_on, bool):
+            return None
+        return replace(state, shown=replace(state.shown, **{option: not is_on}))
+
+    @on(do.Signal.INCLUDE_ERRORS)
+    def include_errors(self, state: AppState) -> AppState:
+        return replace(state, exclusions=Exclusions())
+
+    @on(do.Signal.ZERO_ERRORS)
+    def zero_errors(self, state: AppState) -> AppState:
+        return state.zeroed()
+
+    @on(do.Signal.RESET_ERRORS)
+    def reset_errors(self, state: AppState) -> AppState:
+        return state.reset()
 
     def _go(self, name: str, go: Callable[[], str]) -> None:
         try:
@@ -301,12 +356,6 @@ class PagePanel(Panel):
             return
         done = {"undo": "Undone", "redo": "Redone"}[name]
         self.context.notify(f"{done}: {description}" if description else f"Nothing to {name}")
-
-
-def _with_section(state: AppState, task: str, section: str) -> AppState:
-    """Show a task with a section open."""
-    state = put(put(state, "page.task", task), "page.window", "")
-    return replace(state, page=replace(state.page, open=state.page.open | {section}))
 
 
 # --- The tasks, and all panels --------------------------------------------------------------------
@@ -344,7 +393,7 @@ class TasksPanel(Panel):
         tabs = join(
             tag(
                 "span", words, role="tab", id=f"ws-task-{name}", class_="ws-tab",
-                data_do="page:task", data_value=name, tabindex=0 if name == task else -1,
+                data_do=do.SetLeaf("page.task", name), tabindex=0 if name == task else -1,
                 aria_selected=str(name == task).lower(), aria_controls="ws-task",
             )
             for name, words in TASKS.items()

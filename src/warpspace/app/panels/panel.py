@@ -1,7 +1,7 @@
 """Panels, the parts of the page, and the context that the panels of one tab share.
 
-A panel renders HTML for named places of the page and handles events, ``panel:action`` with a value
-(`browser/incoming.py`). It knows neither widgets nor threads, and no other panel.
+A panel renders HTML for named places of the page and handles actions (`browser/actions.py`) in
+methods with `@on(do.Action)`. It knows neither widgets nor threads, and no other panel.
 
 The context holds page, camera and state of a tab, and the queues of its session. Other threads only
 add to the queues (`receive`, `post`, `call_soon`); the thread of the session works them off. Long
@@ -16,15 +16,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
 from enum import Enum, auto
 from functools import partial
-from typing import ClassVar
+from typing import Any, ClassVar, TypeAlias, TypeVar
 
 from markupsafe import Markup
 from viser import ClientHandle, ViserServer
 
 from warpspace.analysis.description import Result
+from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, join, tag, text_box
-from warpspace.app.browser.incoming import LONGEST_VALUE, Event, Events, event_of
+from warpspace.app.browser.incoming import Events
 from warpspace.app.browser.page import Page
 from warpspace.app.documents.output_services import CancelledError, Services
 from warpspace.app.documents.scene_file import MOST_OPENED, SceneList
@@ -54,7 +55,7 @@ class Context:
     ) -> None:
         self.client, self.page, self.camera = client, Page(server, client), TabCamera(client)
         self.notify = self.page.notify
-        self.events: deque[Event] = deque()
+        self.events: deque[do.AnyAction] = deque()
         self.store, self.scenes, self.services = store, scenes, services
         self.picture: LivePicture | None = None
         self.stage: MovingLayer | None = None
@@ -107,12 +108,12 @@ class Context:
         self._wake.set()
 
     def receive(self, message: Events) -> None:
-        events = [event_of(*event) for event in message.events]
-        if len([*filter(_is_file, self.events), *filter(_is_file, events)]) > MOST_FILES:
+        actions = (*self.events, *message.events)
+        if sum(isinstance(action, do.Upload) for action in actions) > MOST_FILES:
             text = f"More than {MOST_FILES} files at once; select fewer and try again"
             self.notify("Files not opened", text, "problem")
             return
-        self.events.extend(events)
+        self.events.extend(message.events)
         self.mark_changed()
 
     def mark_changed(self) -> None:
@@ -125,8 +126,8 @@ class Context:
         """True while no changes arrive, so that work may start."""
         return time.monotonic() - self.changed_at >= PAUSE_S
 
-    def send(self, event: str, value: str = "") -> None:
-        self.receive(Events([(event, value)]))
+    def send(self, action: do.AnyAction) -> None:
+        self.receive(Events([action]))
 
     def post(self, update: Update) -> None:
         """Queue a pure update of the state."""
@@ -187,10 +188,6 @@ class Context:
             self.camera.choose(self.picture, view, lens)
 
 
-def _is_file(event: Event) -> bool:
-    return len(event.value) > LONGEST_VALUE
-
-
 # --- Panels ---------------------------------------------------------------------------------------
 
 
@@ -203,8 +200,39 @@ class Refresh(Enum):
     IDLE = auto()  # when nothing has happened for a while
 
 
+ActionKind: TypeAlias = type[do.Action] | do.Signal | do.Input
+F = TypeVar("F", bound=Callable[..., AppState | None])
+
+
+def on(kind: ActionKind) -> Callable[[F], F]:
+    """Mark the handler of an action: ``method(state, action)`` returns the changed state, or None.
+
+    The handler of a `Signal` is called without it, that of an `Input` with its text.
+    """
+
+    def mark(method: F) -> F:
+        vars(method)["kind"] = kind
+        return method
+
+    return mark
+
+
+def later(kind: ActionKind) -> Callable[[F], F]:
+    """Mark the handler of an action that leaves the state alone: ``method(action)``.
+
+    It is called in the session, after the state is updated.
+    """
+
+    def mark(method: F) -> F:
+        vars(method)["is_later"] = True
+        return on(kind)(method)
+
+    return mark
+
+
 class Panel:
-    name: str = ""  # prefix of its events
+    name: str = ""  # also in the `PanelAction`s for it
+    handlers: ClassVar[Mapping[object, str]] = {}  # names of methods, by kind of action
     refresh: ClassVar[Refresh] = Refresh.DEBOUNCED
 
     def __init__(self, context: Context) -> None:
@@ -222,8 +250,25 @@ class Panel:
         """Render HTML by the name of its place."""
         return {}
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        """Handle an event; action and value come from a browser and may be anything."""
+    def __init_subclass__(cls) -> None:
+        marked = {name: method for name, method in vars(cls).items() if hasattr(method, "kind")}
+        cls.handlers = {**cls.handlers, **{method.kind: name for name, method in marked.items()}}
+
+    def handles(self, action: do.AnyAction) -> bool:
+        return (
+            do.kind_of(action) in self.handlers and getattr(action, "panel", self.name) == self.name
+        )
+
+    def handle(self, state: AppState, action: do.AnyAction) -> AppState:
+        """Handle an action; those of other panels change nothing."""
+        if not self.handles(action):
+            return state
+        method: Any = getattr(self, self.handlers[do.kind_of(action)])
+        value = action.value if isinstance(action, do.InputValue) else action
+        values = () if isinstance(action, do.Signal) else (value,)
+        if not hasattr(method, "is_later"):
+            return method(state, *values) or state
+        self.context.call_soon(partial(method, *values))
         return state
 
     def rerender(self) -> None:
@@ -261,7 +306,12 @@ class Section(Panel):
         body = self.body(picture) if is_open else EMPTY
         title = self.heading(picture) if is_open else self.title
         section = html.fold(
-            self.name, title, body, opens="page:fold", open_=is_open, hint=self.sentence
+            self.name,
+            title,
+            body,
+            opens=do.Input.FOLD_SECTION(self.name),
+            open_=is_open,
+            hint=self.sentence,
         )
         return {f"section.{self.name}": section}
 
@@ -281,7 +331,9 @@ class Dialog(Panel):
         raise NotImplementedError
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        close = button("✕", "page:close", kind="quiet", hint="Close (Esc)", aria_label="Close")
+        close = button(
+            "✕", do.Signal.CLOSE_DIALOG, kind="quiet", hint="Close (Esc)", aria_label="Close"
+        )
         head = tag("header", tag("h2", self.title, id="ws-window-title") + close)
         body = tag("div", self.body(picture), class_="ws-body", data_key=f"window-{self.name}")
         return {"window": head + body}
@@ -310,7 +362,7 @@ def details(heading: object, *parts: object, kind: str = "options", **extra: obj
 
 def setting(state: AppState, path: str, *, text: str = "", bar: bool = False) -> Markup:
     """Render the control of a leaf of the state: a switch, a list, a text box or a slider."""
-    leaf, present, name = leaves(state)[path], value(state, path), f"state:set.{path}"
+    leaf, present, name = leaves(state)[path], value(state, path), do.SetLeaf(path)
     if leaf.kind == "switch":
         return html.switch(name, leaf.label, on=bool(present), hint=leaf.hint)
     label, control = leaf.label, text_box(name, spell(state, path))
@@ -397,7 +449,7 @@ class Jobs:
         label = f"{job.name}: {share} %" if share else f"{job.name} …"
         if self._waiting:
             label += f" Then: {', '.join(name for name, _ in self._waiting)}"
-        cancel = button("Cancel", f"{self._panel.name}:cancel")
+        cancel = button("Cancel", do.Cancel(self._panel.name))
         return tag("div", join((bar, tag("span", label), cancel)), class_="ws-actions ws-run")
 
     def _run(self, job: Job, work: Callable[[Job], None]) -> None:

@@ -5,13 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 from markupsafe import Markup
 
+from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, fill, join, number, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.drawing.moving import PROGRAM, SPEEDS_DEG_S, MovingLayer
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import rotary_axes
-from warpspace.app.panels.panel import Panel, Refresh
+from warpspace.app.panels.panel import Panel, Refresh, on
 from warpspace.app.state.app_state import AppState
 from warpspace.machine.axes import parameter
 from warpspace.units import MINUS
@@ -42,45 +43,55 @@ class PlaybackPanel(Panel):
         bar = (
             *((_row(state, stage, axis) for axis in rotary_axes(state)) if picture.is_rotary
               else (_program(picture, stage),)),
-            html.choice("playback:speed", f"{speed:g}", speeds, label="Speed"),
-            button("Reset", "playback:stop", kind="quiet",
+            html.choice(do.Input.SET_SPEED(), f"{speed:g}", speeds, label="Speed"),
+            button("Reset", do.Signal.STOP_PLAYBACK, kind="quiet",
                    hint="Return to the axis positions of the scene"),
         )  # fmt: skip
         return {"playback": tag("div", join(bar))}
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        context, stage = self.context, self.context.stage
-        axes = rotary_axes(state) if state.shows_rotary else (PROGRAM,)
-        if stage is None:
-            return state
-        name = action.removeprefix("set.")
-        if action == "play":
-            axis = value if value in axes else stage.axis if stage.axis in axes else axes[-1]
-            on = not (stage.playing and stage.axis == axis)
-            context.call_soon(lambda: stage.play(on, axis))
-        elif action == "stop":
-            context.call_soon(lambda: stage.play(None))
-        elif action == "speed" and value in {f"{at:g}" for at in SPEEDS_DEG_S}:
-            stage.speed_deg_s = float(value)
-        elif PROGRAM in axes:
-            self._move_program(stage, action, value)
-        elif action != name and name in axes:
-            at = _clamped(state, name, value)
-            if at is not None:
-                context.call_soon(lambda: stage.scrub(name, at))
-        return state
+    @on(do.Input.PLAY)
+    def play(self, state: AppState, axis: str) -> None:
+        stage, axes = self.context.stage, _played(state)
+        if stage is not None:
+            axis = next((a for a in (axis, stage.axis) if a in axes), axes[-1])
+            plays = not (stage.playing and stage.axis == axis)
+            self.context.call_soon(lambda: stage.play(plays, axis))
 
-    def _move_program(self, stage: MovingLayer, action: str, value: str) -> None:
-        path = self.context.picture and self.context.picture.path
-        if not path:
+    @on(do.Signal.STOP_PLAYBACK)
+    def stop(self, state: AppState) -> None:
+        if (stage := self.context.stage) is not None:
+            self.context.call_soon(lambda: stage.play(None))
+
+    @on(do.Input.SET_SPEED)
+    def set_speed(self, state: AppState, speed: str) -> None:
+        speeds = {f"{at:g}": at for at in SPEEDS_DEG_S}
+        if self.context.stage is not None and speed in speeds:
+            self.context.stage.speed_deg_s = speeds[speed]
+
+    @on(do.Scrub)
+    def scrub(self, state: AppState, action: do.Scrub) -> None:
+        stage, axis = self.context.stage, action.axis
+        if stage is None or axis not in _played(state):
             return
-        if action == "worst":
+        if axis == PROGRAM:
+            path = self.context.picture and self.context.picture.path
+            sample = index_of(action.value, len(path.error_um)) if path else None
+            if sample is not None:
+                self.context.call_soon(lambda: stage.scrub_program(sample))
+        elif (at := _clamped(state, axis, action.value)) is not None:
+            self.context.call_soon(lambda: stage.scrub(axis, at))
+
+    @on(do.Signal.SHOW_WORST_BLOCK)
+    def show_worst(self, state: AppState) -> None:
+        stage, path = self.context.stage, self.context.picture and self.context.picture.path
+        if stage is not None and path and PROGRAM in _played(state):
             worst = int(np.argmax(np.linalg.norm(path.error_um, axis=1)))
             self.context.call_soon(lambda: stage.play(False))
             self.context.call_soon(lambda: stage.scrub_program(worst))
-        sample = index_of(value, len(path.error_um))
-        if action == f"set.{PROGRAM}" and sample is not None:
-            self.context.call_soon(lambda: stage.scrub_program(sample))
+
+
+def _played(state: AppState) -> tuple[str, ...]:
+    return rotary_axes(state) if state.shows_rotary else (PROGRAM,)
 
 
 def _program(picture: LivePicture, stage: MovingLayer | None) -> Markup:
@@ -96,13 +107,14 @@ def _program(picture: LivePicture, stage: MovingLayer | None) -> Markup:
     return fill(
         '<div class="ws-turn">{play}<b>Program</b>{slider}<span>{words}</span>{worst}</div>'
         '<div class="ws-line"><code>{code}</code> {error}</div>',
-        play=button("Pause" if plays else "Play", "playback:play", PROGRAM, kind="quiet",
+        play=button("Pause" if plays else "Play", do.Input.PLAY(PROGRAM), kind="quiet",
                     aria_label=f"{'Pause' if plays else 'Play'} the program",
                     data_key="play-program", hint="Move the machine along the path (P)"),
-        slider=html.slider(f"playback:set.{PROGRAM}", sample, 0, len(path.error_um) - 1, 1.0,
+        slider=html.slider(do.Scrub(PROGRAM), sample, 0, len(path.error_um) - 1, 1.0,
                            label="Position in the program", text=words),
         words=words, code=code, error=_error_words(picture, sample),
-        worst=button("Worst", "playback:worst", kind="quiet", hint="Go to the largest error"),
+        worst=button("Worst", do.Signal.SHOW_WORST_BLOCK, kind="quiet",
+                     hint="Go to the largest error"),
     )  # fmt: skip
 
 
@@ -141,10 +153,10 @@ def _row(state: AppState, stage: MovingLayer | None, axis: str) -> str:
     text = f"{at:.0f}°".replace("-", MINUS)
     return fill(
         '<div class="ws-turn">{play}<b>{axis}</b>{slider}<span>{text}</span></div>',
-        play=button("Pause" if plays else "Play", "playback:play", axis, kind="quiet",
+        play=button("Pause" if plays else "Play", do.Input.PLAY(axis), kind="quiet",
                     aria_label=f"{'Pause' if plays else 'Play'} {axis}", data_key=f"play-{axis}",
                     hint=f"{'Pause' if plays else 'Turn'} {axis} (P)"),
         axis=axis, text=text,
-        slider=html.slider(f"playback:set.{axis}", at, low, high, 1.0, label=f"Position of {axis}",
+        slider=html.slider(do.Scrub(axis), at, low, high, 1.0, label=f"Position of {axis}",
                            text=text),
     )  # fmt: skip

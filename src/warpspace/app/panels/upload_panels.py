@@ -13,6 +13,7 @@ from warpspace.analysis import description
 from warpspace.analysis.blocks import Block, Curve, Lines, Style, Table
 from warpspace.analysis.options import Grammar, Option, option, typed_word
 from warpspace.analysis.registry import Entry
+from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, join, tag, upload_button
 from warpspace.app.browser.incoming import index_of
@@ -23,7 +24,7 @@ from warpspace.app.panels.analysis_panel import ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.file_dialogs import accepted_endings
 from warpspace.app.panels.measurement import MOST_BYTES, FilesPanel, UploadedFile
-from warpspace.app.panels.panel import Context, actions, quiet, setting
+from warpspace.app.panels.panel import Context, actions, on, quiet, setting
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
 from warpspace.app.state.form_values import option_values, read_form
@@ -204,11 +205,11 @@ class ImportPanel(FilesPanel):
     def actions(self, result: description.Result, *, stale: bool) -> Markup:
         return EMPTY
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
+    def apply(self, state: AppState, action: do.Apply) -> AppState | None:
         """Apply an import, and record the file of each error that it changes."""
-        changed = super().handle(state, action, value)
-        if action != "apply" or changed is state:
-            return changed
+        changed = super().apply(state, action)
+        if changed is None:
+            return None
         names = ", ".join(file.name for file in self.files)
         curves = {key: changed.curve(key) for key in changed.amplitudes}
         imported = {
@@ -270,6 +271,7 @@ def _unfolded(state: AppState, *, keeps_forms: bool) -> AppState:
 # --- The workpiece and the NC program in the working volume ---------------------------------------
 
 MOST_LETTERS = 200  # of a displayed line
+AXES: tuple[Literal["x", "y", "z"], ...] = ("x", "y", "z")  # of the workpiece
 
 
 class SceneOverlayPanel(FilesPanel):
@@ -302,7 +304,9 @@ class SceneOverlayPanel(FilesPanel):
         missing = "is not loaded: links and saved scenes store only its name. Open it again."
         about = quiet(f"{name} {missing}") if name else EMPTY
         if content:
-            remove = button("✕", f"{self.name}:remove", kind="link", aria_label=f"Remove {name}")
+            remove = button(
+                "✕", do.RemoveOverlay(self.name), kind="link", aria_label=f"Remove {name}"
+            )
             about = tag("p", join((tag("b", name), " ", remove))) + self.about(state)
         return join((about, self.files_html(), actions(upload)))
 
@@ -321,10 +325,9 @@ class SceneOverlayPanel(FilesPanel):
         part = replace(state.part, **fields, **changes)
         return edits.with_sight(replace(state, part=part), inside=not part.is_empty)
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        if action == "remove" and not value:
-            return self.with_content(state, None, "")
-        return super().handle(state, action, value)
+    @on(do.RemoveOverlay)
+    def remove_overlay(self, state: AppState, action: do.RemoveOverlay) -> AppState:
+        return self.with_content(state, None, "")
 
 
 class PartPanel(SceneOverlayPanel):
@@ -342,9 +345,9 @@ class PartPanel(SceneOverlayPanel):
         return {"place": part.place, "mesh": part.mesh, **files}
 
     def about(self, state: AppState) -> Markup:
-        turns = (button(f"{axis} 90°", f"{self.name}:turn", axis, kind="choice",
+        turns = (button(f"{axis} 90°", do.TurnPart(axis), kind="choice",
                         hint=f"Rotate by 90° about the workpiece axis {axis}, in place")
-                 for axis in "xyz")  # fmt: skip
+                 for axis in AXES)  # fmt: skip
         return join((
             actions(tag("span", "Rotate about"), *turns),
             *(setting(state, f"part.{name}") for name in ("place", "shown", "normal", "moved")),
@@ -357,16 +360,19 @@ class PartPanel(SceneOverlayPanel):
         verdicts = [(name, verdict) for name, *_, verdict, _ in features.rows if verdict]
         return html.rows(verdicts) + super().result_html(result)
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        part = part_overlay(state) if action == "turn" and value in ("x", "y", "z") else None
-        if part is not None:
-            turn = transforms.placed(part.of.middle_mm, 90.0 * np.eye(3)["xyz".index(value)])
-            return replace(state, part=replace(state.part, place=moved_place(part.of, turn)))
-        updated = super().handle(state, action, value)
-        if action == "set.unit" and state.part.mesh and self._sent:
+    @on(do.TurnPart)
+    def turn(self, state: AppState, action: do.TurnPart) -> AppState | None:
+        part = part_overlay(state)
+        if part is None:
+            return None
+        turn = transforms.placed(part.of.middle_mm, 90.0 * np.eye(3)["xyz".index(action.axis)])
+        return replace(state, part=replace(state.part, place=moved_place(part.of, turn)))
+
+    def set_option(self, state: AppState, action: do.SetOption) -> AppState | None:
+        if action.option == "unit" and state.part.mesh and self._sent:
             sent = self._sent
             self.receive(lambda: sent)
-        return updated
+        return super().set_option(state, action)
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
         """Parse tolerances, or a mesh; a mesh of another name is placed at the centre."""
@@ -399,7 +405,9 @@ class ProgramPanel(SceneOverlayPanel):
     def result_html(self, result: description.Result) -> Markup:
         def link(line: int) -> Markup:
             hint = "Show this line in the drawing; a click on the path selects its line"
-            return button(line, f"{self.name}:set.at_line", line, kind="link", hint=hint)
+            return button(
+                line, do.SetOption(self.name, "at_line", str(line)), kind="link", hint=hint
+            )
 
         *tables, worst = (block for block in result.blocks() if isinstance(block, Table))
         line, *columns = worst.columns

@@ -2,8 +2,8 @@
 
 The path of a slider move:
 
-1. `browser/page.js` sends an event; the connection of the tab (`server/connection_guard.py`)
-   queues it;
+1. `browser/page.js` sends an action (`browser/actions.py`); the connection of the tab
+   (`server/connection_guard.py`) queues it;
 2. `Session._follow` passes it to its panel (`panels/`), which returns the changed state;
 3. the state is stored (`state/store.py`) and
 4. evaluated (`evaluation/live_model.py`);
@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from warpspace.app.browser.incoming import Event
+from warpspace.app.browser import actions as do
 from warpspace.app.browser.viser_private import queued
 from warpspace.app.drawing.box import BoxLayer
 from warpspace.app.drawing.camera import focus
@@ -138,7 +138,6 @@ def _key(panel: Panel, picture: LivePicture) -> object:
 
 
 logger = logging.getLogger(__name__)
-TAB = "tab"  # prefix of events of the page itself
 TOKEN_WAIT_S = 0.25  # the first picture waits for the token of a tab that reconnects
 MOST_QUEUED, BEHIND_S = 4, 0.02  # messages to a slow page, and the wait for it to read them
 RESCALE_MS = 250  # animation of the box at the end of a drag
@@ -223,8 +222,9 @@ class Session:
                 self._turn()
         finally:
             self.context.store.unsubscribe(self.context.mark_changed)
-            if pointer := self.display.panels.get(PointerPanel.name):
-                pointer.handle(self.state, "gone", "")
+            pointer = self.display.panels.get(PointerPanel.name)
+            if isinstance(pointer, PointerPanel):
+                pointer.hide()
 
     def _turn(self) -> None:
         due_at, stage = self._surroundings_due_at, self.context.stage
@@ -277,7 +277,7 @@ class Session:
         context, tabs = self.context, self._review_tabs
         if context.story_state is not None:
             tabs, story = None, self.display.panels[StoryPanel.name]
-            self.run_guarded(partial(story.handle, self.state, "end", ""))
+            self.run_guarded(partial(story.handle, self.state, do.Signal.END_STORY))
         elif failed.state is target.state and failed.page is target.page:
             return False
         else:
@@ -303,8 +303,8 @@ class Session:
         context = self.context
         if not context.events:
             context.wait(TOKEN_WAIT_S)
-        if context.events and context.events[0].part == TAB:
-            self._handle_tab_event(context.events.popleft())
+        if context.events and isinstance(context.events[0], do.TabHere):
+            self._handle_page_action(context.events.popleft())
         context.wake()  # for the other events
         try:
             self._open(self._live.evaluate(self.state))
@@ -336,7 +336,7 @@ class Session:
         try:
             with context.page.batch():
                 context.stage = MovingLayer(self._client, context.page, picture)
-                context.stage.clamp = partial(context.send, "state:set.part.place")
+                context.stage.clamp = lambda place: context.send(do.SetLeaf("part.place", place))
                 self.display.add(picture, [context.stage])
                 context.page.call("stage", "open")
         except Exception as error:
@@ -356,23 +356,24 @@ class Session:
         ray = np.array([origin, direction], dtype=float)
         line = pick_line(picture, ray[0] / SCENE_PER_MM, ray[1])
         if line:
-            context.send("program:set.at_line", str(line))
+            context.send(do.SetOption("program", "at_line", str(line)))
             return
         hit = pick(picture, ray[0] / SCENE_PER_MM, ray[1])
         if hit is not None:
             context.post(lambda state: with_clicked(state, hit[0]))
 
-    def _handle_tab_event(self, event: Event) -> None:
-        if event.word == "drawn" and self._surroundings_due_at is not None:
+    def _handle_page_action(self, action: do.AnyAction) -> None:
+        """Handle an action of the page itself, not of a panel."""
+        if action is do.Signal.DRAWN and self._surroundings_due_at is not None:
             self._surroundings_due_at = 0.0
-        if event.word in ("hold", "release"):
-            is_held, context = event.word == "hold", self.context
+        if action in (do.Signal.HOLD, do.Signal.RELEASE):
+            is_held, context = action is do.Signal.HOLD, self.context
             self._drag_start = context.picture if is_held else None
             context.held_since = context.changed_at if is_held else None
-        if event.word != "here" or self._is_identified:
+        if not isinstance(action, do.TabHere) or self._is_identified:
             return
         self._is_identified = True
-        record = self._claim(self, event.value[:100])
+        record = self._claim(self, action.token)
         if record is not None:
             self.use(record.store)
             self.context.camera.wanted = record.camera
@@ -382,13 +383,12 @@ class Session:
 
     def _follow(self) -> None:
         context = self.context
-        for event in [context.events.popleft() for _ in range(len(context.events))]:
-            panel = self.display.panels.get(event.part)
-            if event.part == TAB:
-                self._handle_tab_event(event)
-            elif panel is not None:
-                take = partial(panel.handle, action=event.word, value=event.value)
-                self.run_guarded(partial(context.apply, take))
+        for action in [context.events.popleft() for _ in range(len(context.events))]:
+            self._handle_page_action(action)
+            for panel in self.display.panels.values():
+                if panel.handles(action):
+                    take = partial(panel.handle, action=action)
+                    self.run_guarded(partial(context.apply, take))
         while context.actions:
             self.run_guarded(context.actions.popleft())
         notes, context.notes = context.notes, []

@@ -18,12 +18,13 @@ from functools import partial
 
 import msgspec
 
+from warpspace.app.browser import actions as do
 from warpspace.app.documents import scene_file
 from warpspace.app.documents.transfers import safe_name
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.compare import without_table
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.panel import Context, Panel, Refresh
+from warpspace.app.panels.panel import Context, Panel, Refresh, later
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.app.state.store import StateStore
 from warpspace.exceptions import OptionError, WarpspaceError
@@ -185,19 +186,17 @@ class TabKeeper(Panel):
         context.page.call("server.keep", text)
         return {}
 
-    def handle(self, state: AppState, action: str, value: str) -> AppState:
-        if action == "kept" and self._awaits_copy:
-            self._awaits_copy = False
-            self.context.call_soon(partial(self._restore, value))
-        return state
-
-    def _restore(self, text: str) -> None:
+    @later(do.StoredCopy)
+    def restore(self, action: do.StoredCopy) -> None:
+        if not self._awaits_copy:
+            return
+        self._awaits_copy = False
         context, say = self.context, partial(self.context.page.call, "server.say")
         if self._shared and context.store.is_edited:
             say("You are in the shared review as it is now", [JOINED])
             return
         try:
-            state, camera, missing = read_page_copy(text, context.scenes.fixed)
+            state, camera, missing = read_page_copy(action.text, context.scenes.fixed)
         except WarpspaceError as error:
             say("This tab could not be restored", [REFUSED.format(error)])
             return
