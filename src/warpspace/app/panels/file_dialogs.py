@@ -282,9 +282,8 @@ class ReportDialog(JobDialog):
             for index, (title, _) in enumerate(self.context.report_results)
         ]
         # the list of notes may hold a box for the same name
-        author = text_box(
-            do.SetLeaf("page.author"), picture.state.page.author, id="ws-report-author"
-        )
+        name = picture.state.page.author
+        author = text_box(do.SetLeaf("page.author"), name, id="ws-report-author")
         return join((
             tag("p", f"{subject} {limit}."),
             field("Author", author, "report.author"),

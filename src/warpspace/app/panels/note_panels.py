@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 from markupsafe import Markup
 
@@ -50,9 +51,8 @@ class NotesPanel(Panel):
         restored = self._restored_view(state)
         if restored is not None:
             title, note_id, *_ = restored
-            leave = button(
-                "Back", do.Signal.LEAVE_NOTE_VIEW, kind="chip", hint="Return to the previous view"
-            )
+            hint = "Return to the previous view"
+            leave = button("Back", do.Signal.LEAVE_NOTE_VIEW, kind="chip", hint=hint)
             changed = tag("span", "", class_="ws-changed", data_piece=f"note.{note_id}.bar")
             bar = tag("p", join((title, leave, changed)), role="status", class_="ws-reopened")
         return {"notes": _list_html(state) if state.page.notes else EMPTY, "reopened": bar}
@@ -318,31 +318,17 @@ def _buttons(note: Note, steps: Sequence[Note]) -> Markup:
     """Render the buttons of a note; a note with conflicting versions cannot be edited."""
     is_done, free = note.status == "done", not note.versions
     place, change = steps.index(note) if note.step else 0, free and note.change
+    edit = partial(do.EditNote, note.id)
     rows = (
-        (
-            "Done",
-            do.EditNote(note.id, "status"),
-            "Mark as open" if is_done else "Mark as done",
-            free,
-        ),
+        ("Done", edit("status"), "Mark as open" if is_done else "Mark as done", free),
         ("Show", do.Input.SHOW_NOTE(note.id), "Restore view, errors and camera of the note", True),
-        ("Edit", do.EditNote(note.id, "edit"), "", free),
-        ("Delete", do.EditNote(note.id, "delete"), "", True),
-        (
-            "Revert",
-            do.EditNote(note.id, "revert"),
-            "Restore the values before this decision",
-            change,
-        ),
-        ("Add to story", do.EditNote(note.id, "add"), "", free and not note.step),
-        ("↑", do.EditNote(note.id, "up"), "Earlier in the story", free and place > 0),
-        (
-            "↓",
-            do.EditNote(note.id, "down"),
-            "Later in the story",
-            free and note.step and note != steps[-1],
-        ),
-        ("Remove from story", do.EditNote(note.id, "out"), "", free and note.step),
+        ("Edit", edit("edit"), "", free),
+        ("Delete", edit("delete"), "", True),
+        ("Revert", edit("revert"), "Restore the values before this decision", change),
+        ("Add to story", edit("add"), "", free and not note.step),
+        ("↑", edit("up"), "Earlier in the story", free and place > 0),
+        ("↓", edit("down"), "Later in the story", free and note.step and note != steps[-1]),
+        ("Remove from story", edit("out"), "", free and note.step),
     )
     return actions(*(
         button(label, action, hint=hint, kind="" if label == "Done" else "link",
