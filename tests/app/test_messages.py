@@ -5,6 +5,7 @@ import logging
 import re
 import threading
 import time
+from importlib.resources import files
 from types import SimpleNamespace
 from typing import get_args
 
@@ -153,6 +154,18 @@ def test_actions_without_meaning_are_refused_in_words_and_the_page_goes_on(caplo
         assert not [text for *_, text in wire.toasts if re.match(r"\w+Error: ", text)]
         assert "<img" not in "".join(wire.pieces.values())
     assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []
+
+
+def test_one_script_names_the_private_parts_of_viser():
+    folder = files("warpspace.app")
+    scripts = [
+        path
+        for room in ("browser", "documents")
+        for path in folder.joinpath(room).iterdir()
+        if path.name.endswith(".js")
+    ]
+    named = [path.name for path in scripts if "__viser" in path.read_text("utf-8")]
+    assert (len(scripts) > 9, named) == (True, ["viser_private.js"])
 
 
 def test_texts_stay_texts_within_a_script(client, monkeypatch):

@@ -7,7 +7,7 @@
   const floats = text => text.BYTES_PER_ELEMENT ? text : new Float32Array(bytes(text).buffer);
   const find = (name, matches) => {
     let match = null;
-    window.__viserMutable?.nodeRefFromName[name]?.traverse(part => {
+    warpspaceViser.node(name)?.traverse(part => {
       if (!match && matches(part)) match = part;
     });
     return match;
@@ -27,7 +27,7 @@
         for (let k = 0; k < 3; k++) data.array[3 * i + k] = place[3 * ends[i] + k] + lifts[3 * i + k];
       data.needsUpdate = true;
     }
-    window.__viserMutable.requestRender?.();
+    warpspaceViser.requestRender();
   };
   let turn = 0;
 
@@ -73,11 +73,11 @@
     },
     // like viser's message for a pose
     move(name, at) {
-      const pose = window.__viserMutable?.nodePoseData[name];
+      const pose = warpspaceViser.pose(name);
       if (!pose) return;
       pose.position = at;
       if (pose.poseUpdateState !== "waitForMakeObject") pose.poseUpdateState = "needsUpdate";
-      window.__viserMutable.requestRender?.();
+      warpspaceViser.requestRender();
     },
   };
 })();

@@ -10,7 +10,6 @@
 
   const root = warpspacePage.over;
   const part = name => root.querySelector(`.ws-${name}`);
-  const view = () => window.__viserMutable;
   const zoom = () => root.currentCSSZoom ?? 1;
 
   const roundDown = value => {
@@ -226,25 +225,25 @@
     blendSrcAlpha: 201, blendDstAlpha: 205 };
   const holdBackGhost = () => {
     let changed = false;
-    view().nodeRefFromName["/ghost_machine"]?.traverse(part => {
+    warpspaceViser.node("/ghost_machine")?.traverse(part => {
       if (!part.material) return;
       part.renderOrder = -1000;
       if (part.material.blending === GHOST.blending && !part.material.transparent) return;
       Object.assign(part.material, GHOST);
       part.material.needsUpdate = changed = true;
     });
-    if (changed) view().requestRender?.();
+    if (changed) warpspaceViser.requestRender();
   };
 
   // the selected trace and measured distances are never hidden by the box
   const FORWARD = ["/traces/actual", "/traces/nominal", "/measured/nominal", "/measured/actual", "/measured/points"];
   const bringForward = () => {
     for (const name of FORWARD)
-      view().nodeRefFromName[name]?.traverse(piece => {
+      warpspaceViser.node(name)?.traverse(piece => {
         if (!piece.material?.depthTest) return;
         piece.material.depthTest = false;
         piece.renderOrder = 100;
-        view().requestRender?.();
+        warpspaceViser.requestRender();
       });
   };
 
@@ -267,8 +266,7 @@
   let pending = "";
   const frame = () => {
     requestAnimationFrame(frame);
-    const mutable = view(), canvas = mutable?.canvas, camera = mutable?.camera;
-    const world = mutable?.nodeRefFromName?.[""]?.matrixWorld?.elements;
+    const canvas = warpspaceViser.canvas(), camera = warpspaceViser.camera(), world = warpspaceViser.world();
     if (!canvas?.isConnected || !camera || !world) return;
     const rect = canvas.getBoundingClientRect();
     const now = performance.now();

@@ -110,10 +110,10 @@
   };
 
   // --- actions, in order: the first is sent immediately, those that follow quickly are sent together -
-  const post = events => window.__viserMutable.sendMessage({ type: "WarpspaceEvents", events });
+  const post = events => warpspaceViser.send({ type: "WarpspaceEvents", events });
   const flush = () => {
     clearTimeout(timer);
-    timer = window.__viserMutable ? 0 : setTimeout(flush, SEND_MS);
+    timer = warpspaceViser.isReady() ? 0 : setTimeout(flush, SEND_MS);
     if (timer || !pending.length) return;
     last = performance.now();
     post(pending.splice(0, MOST_EVENTS).map(([, action]) => action));

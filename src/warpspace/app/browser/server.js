@@ -38,10 +38,10 @@
     // called with every connection, after viser has set `sendMessage`
     watch() {
       clearInterval(window.__warpspaceWatch);
-      const send = window.__viserMutable?.sendMessage;
+      const connection = warpspaceViser.connection();
       let count = null, since = 0;
       window.__warpspaceWatch = setInterval(() => {
-        if (!send || window.__viserMutable.sendMessage === send) return;
+        if (!connection || warpspaceViser.connection() === connection) return;
         if (!count?.isConnected) {
           since ||= Date.now();
           const kept = read(), time = kept && new Date(kept.at).toLocaleTimeString();

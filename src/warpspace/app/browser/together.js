@@ -3,12 +3,12 @@
   const OFTEN_MS = 100, GONE_MS = 3000;
   const pointers = new Map();
   let installed = false, last = 0, over = false, drawing = false;
-  const view = () => window.__viserMutable;
+  const view = () => ({ canvas: warpspaceViser.canvas(), camera: warpspaceViser.camera() });
   const author = () => { try { return localStorage.getItem("warpspace-author") ?? ""; } catch { return ""; } };
 
   const gone = () => { if (over) { over = false; warpspacePage.send("pointer_gone"); } };
   const move = event => {
-    const { canvas, camera } = view() ?? {}, now = performance.now();
+    const { canvas, camera } = view(), now = performance.now();
     if (!canvas || event.target !== canvas || event.buttons) { gone(); return; }
     if (now - last < OFTEN_MS) return;
     last = now;
@@ -21,7 +21,7 @@
   };
 
   const draw = () => {
-    const { canvas, camera } = view() ?? {}, now = performance.now(), root = warpspacePage.over;
+    const { canvas, camera } = view(), now = performance.now(), root = warpspacePage.over;
     for (const [key, { dot, at, until }] of pointers) {
       if (now > until || !canvas) { dot.remove(); pointers.delete(key); continue; }
       const projected = camera.position.clone().set(...warpspaceFly.out(at)).project(camera);

@@ -18,12 +18,12 @@
   };
   const draw = long => {
     clearTimeout(timer);
-    const { warpspaceMesh: mesh, warpspaceFly: fly, __viserMutable: view } = frame.contentWindow;
+    const { warpspaceMesh: mesh, warpspaceFly: fly, warpspaceViser: viser } = frame.contentWindow;
     const { camera, point, shifts, levels, palette } = steps[at];
     const wait = () => { timer = setTimeout(draw, 100, long); };  // the drawing is not there yet
-    if (!view?.nodeRefFromName?.["/box/surface"] || !fly(fitted(camera), long)) { wait(); return; }
+    if (!viser?.node("/box/surface") || !fly(fitted(camera), long)) { wait(); return; }
     if (frame.clientWidth < NARROW)
-      for (const name in view.nodeRefFromName) if (name.startsWith("/words/tick")) mesh.move(name, [0, 0, 1e4]);
+      for (const name of viser.nodeNames()) if (name.startsWith("/words/tick")) mesh.move(name, [0, 0, 1e4]);
     if (!from) return;
     mesh.move("/story/point", point);
     mesh.open({ count, lines, palette });

@@ -203,7 +203,8 @@ def _packed_steps(steps: Sequence[PageStep]) -> str:
 
 def _build_page(title: str, steps: Sequence[PageStep], shapes: Shapes, about: About) -> str:
     texts = files("warpspace.app.documents")
-    scripts = "".join(f"<script>{script_source(name)}</script>" for name in ("mesh.js", "fly.js"))
+    names = "viser_private.js", "mesh.js", "fly.js"
+    scripts = "".join(f"<script>{script_source(name)}</script>" for name in names)
     scene = _export(steps[0], shapes).replace("</body>", f"{scripts}</body>")
     remarks = ("drag to turn, wheel to zoom", f"warpspace {__version__}")
     if steps[0].note:
