@@ -163,7 +163,7 @@ COMMANDS = (
     Command("Reset all errors to the scene", "page:reset", keys=("ctrl+alt+r",)),
     Command("Include all errors", "page:include", keys=("ctrl+alt+l",)),
     Command("Help and all commands", "page:open", "help", ("ctrl+k", "h", "?", "shift+?")),
-    Command("First steps", "page:tour"),
+    Command("Show the hints", "page:hints", search_terms="first steps tour"),
 )
 
 
@@ -273,7 +273,7 @@ class PagePanel(Panel):
             "undo": partial(self._go, "undo", context.store.undo),
             "redo": partial(self._go, "redo", context.store.redo),
             "fit": context.fit_view,
-            "tour": partial(context.page.call, "tour", True),
+            "hints": partial(context.page.call, "hints", True),
             "close": context.dialog_closed,
         }
         if action in actions:
@@ -283,7 +283,7 @@ class PagePanel(Panel):
             "fold": partial(toggled, state, "page.open", value),
             "open": partial(put, put(state, "page.command", ""), "page.window", value),
             "section": partial(_with_section, state, *value.partition(".")[::2]),
-            **dict.fromkeys(("close", "tour"), partial(put, state, "page.window", "")),
+            **dict.fromkeys(("close", "hints"), partial(put, state, "page.window", "")),
             "include": partial(replace, state, exclusions=Exclusions()),
             "zero": state.zeroed,
             "reset": state.reset,
