@@ -9,7 +9,16 @@ from textwrap import shorten
 from markupsafe import Markup
 
 from warpspace.analysis.registry import entries
-from warpspace.app.browser.html import EMPTY, button, join, rows, tag, text_box, upload_button
+from warpspace.app.browser.html import (
+    EMPTY,
+    button,
+    join,
+    rows,
+    tag,
+    text_box,
+    thumbnail,
+    upload_button,
+)
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import machine_editor, overlay
 from warpspace.app.panels.analysis_panel import AnalysisPanel
@@ -31,7 +40,7 @@ from warpspace.bench.base import bench_names, find_test
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_UPLOAD_BYTES
 
-LONGEST_SENTENCE = 110
+LONGEST_SENTENCE = 130
 
 
 class StatePanel(Panel):
@@ -83,24 +92,25 @@ class TopPanel(Panel):
 
 
 class ScenesDialog(Dialog):
-    """The list of scenes: title, machine, description."""
+    """The list of scenes: picture, title, machine, description."""
 
     name, title = "scenes", "Select a scene"
 
     def body(self, picture: LivePicture) -> Markup:
+        fixed = {*map(id, self.context.scenes.fixed)}
         scenes = (
-            tag("button", join((
+            tag("button", thumbnail(scene.name if id(scene) in fixed else "") + tag("span", join((
                 tag("b", title),
                 tag("small", scene.machine.title) if scene.machine.title != title else EMPTY,
                 tag("small", shorten(re.split(r"\.\s", scene.description)[0].rstrip(" .\n"),
                                      LONGEST_SENTENCE, placeholder=" …"))
                 if scene.description else EMPTY,
-            )), type="button", data_do="scenes:choose", data_value=title,
+            ))), type="button", data_do="scenes:choose", data_value=title,
                 aria_current="true" if scene is picture.state.origin else None)
             for title, scene in self.context.scenes.items()
         )  # fmt: skip
         hint = quiet("To open a file, use Open in the top bar, or drop it on the page.")
-        return tag("div", join(scenes), class_="ws-list", data_list=True) + hint
+        return tag("div", join(scenes), class_="ws-list ws-scenes", data_list=True) + hint
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action != "choose" or value not in self.context.scenes:
