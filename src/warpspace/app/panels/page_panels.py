@@ -9,16 +9,8 @@ from textwrap import shorten
 from markupsafe import Markup
 
 from warpspace.analysis.registry import entries
-from warpspace.app.browser.html import (
-    EMPTY,
-    button,
-    join,
-    rows,
-    tag,
-    text_box,
-    thumbnail,
-    upload_button,
-)
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, join, rows, tag, text_box, upload_button
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import machine_editor, overlay
 from warpspace.app.panels.analysis_panel import AnalysisPanel
@@ -99,7 +91,7 @@ class ScenesDialog(Dialog):
     def body(self, picture: LivePicture) -> Markup:
         fixed = {*map(id, self.context.scenes.fixed)}
         scenes = (
-            tag("button", thumbnail(scene.name if id(scene) in fixed else "") + tag("span", join((
+            tag("button", html.thumbnail(scene.name * (id(scene) in fixed)) + tag("span", join((
                 tag("b", title),
                 tag("small", scene.machine.title) if scene.machine.title != title else EMPTY,
                 tag("small", shorten(re.split(r"\.\s", scene.description)[0].rstrip(" .\n"),
