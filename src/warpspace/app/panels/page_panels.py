@@ -89,9 +89,9 @@ class ScenesDialog(Dialog):
     name, title = "scenes", "Select a scene"
 
     def body(self, picture: LivePicture) -> Markup:
-        fixed = {*map(id, self.context.scenes.fixed)}
+        bundled = {id(scene): scene.name for scene in self.context.scenes.fixed}
         scenes = (
-            tag("button", html.thumbnail(scene.name * (id(scene) in fixed)) + tag("span", join((
+            tag("button", html.thumbnail(bundled.get(id(scene), "")) + tag("span", join((
                 tag("b", title),
                 tag("small", scene.machine.title) if scene.machine.title != title else EMPTY,
                 tag("small", shorten(re.split(r"\.\s", scene.description)[0].rstrip(" .\n"),
