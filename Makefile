@@ -18,7 +18,7 @@ SPHINX := OMP_NUM_THREADS=1 $(BIN)/python -m sphinx -d docs/_build/doctrees docs
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help view test nightly reliability coverage lint style format bench screenshots docs linkcheck \
+.PHONY: help view test nightly reliability coverage lint style format bench screenshots thumbnails docs linkcheck \
     drawings dist packaging golden clean system-packages nightly-packages
 
 help: ## list the targets
@@ -62,6 +62,9 @@ bench: system-packages $(DEV_STAMP) ## run every benchmark and write docs/perfor
 
 screenshots: system-packages $(DEV_STAMP) ## take the pictures of README and docs anew
 	$(BIN)/python examples/screenshots.py $(ARGS)
+
+thumbnails: system-packages $(DEV_STAMP) ## draw the pictures of the list of scenes anew (ARGS="ur10")
+	$(BIN)/python examples/thumbnails.py $(ARGS)
 
 docs: system-packages $(DOCS_STAMP) ## build the documentation site into docs/_build/html, run its doctests
 	$(SPHINX) docs/_build/html -b html -W --keep-going $(ARGS)

@@ -8,6 +8,8 @@ from axe_playwright_python.sync_playwright import Axe
 
 from app.frames import new_visitor
 from app.page_tab import SCENES, Tab, wait_until_open
+from app.test_browser_sizes import overlap, settled
+from app.test_journeys import MOST
 from app.wire import end_work
 from page_client import selector
 from warpspace.app.browser import actions as do
@@ -17,13 +19,17 @@ from warpspace.app.state.app_state import start_state
 from warpspace.app.state.look import TASKS
 
 START = start_state(SCENES[0])
-TITLES = ["Deformed volume", "Errors", "Five tasks"]
-APART = """() => {
-  const [card, target] = ["#ws-tour", ".ws-pointed"].map(
-    which => document.querySelector(which).getBoundingClientRect());
-  return card.left >= target.right || card.right <= target.left
-    || card.top >= target.bottom || card.bottom <= target.top;
+HINTS = """() => {
+  const boxes = found => found.filter(node => node.checkVisibility({ visibilityProperty: true }))
+    .map(node => node.getBoundingClientRect()).filter(box => box.width && box.height);
+  const hints = [...document.querySelectorAll(".ws-hint")];
+  const others = [...document.querySelectorAll("button, input, select, summary, [role=tab],"
+    + " .ws-head > *, .ws-legend > b, .ws-scale, .ws-scale i, .ws-error, .ws-section, .ws-triad")]
+    .filter(node => !node.closest(".ws-hint"));
+  return [boxes(hints), boxes(others)].map(
+    list => list.map(({ left, top, right, bottom }) => [left, top, right, bottom]));
 }"""
+"""Rectangles of the hints, and of what they might cover."""
 FOCUSED = """() => {
   const own = document.activeElement, part = own.closest("#ws-top, #ws-left, #ws-over, #ws-right");
   return [part?.id ?? "", parseFloat(getComputedStyle(own).outlineWidth)];
@@ -33,27 +39,48 @@ UNFOLD = """() => document.querySelectorAll("#ws-right details:not(:has(> [data-
 """Unfolds what the page unfolds by itself."""
 
 
-def test_first_steps_are_shown_once_beside_what_they_explain(viewer, browser):
+def hints_of(page):
+    return page.evaluate(HINTS)[0]
+
+
+@pytest.mark.parametrize("size", [(360, 740), (1024, 768), (1440, 900), (2560, 1440)])
+def test_hints_cover_nothing_and_the_first_visit_is_as_calm_as_others(open_tab, size):
+    tab = open_tab(size=size, query="&hints=on")
+    box, (hints, others) = settled(tab), tab.page.evaluate(HINTS)
+    assert len(hints) == 3
+    assert len(others) > 20
+    for hint in hints:
+        assert [other for other in [box, *others] if overlap(hint, other)] == []
+        assert hint[0] >= 0
+        assert hint[2] <= size[0]
+    if size == (1440, 900):
+        tab.says("51.7 → 50.2 µm")
+        assert all(n <= most for n, most in zip(tab.seen(), MOST, strict=True)), tab.seen()
+
+
+def test_hints_are_shown_once_and_hidden_by_their_button_esc_or_first_use(viewer, browser):
     with new_visitor(browser, (1440, 900)) as context:
         page = context.new_page()
         page.goto(viewer.url)
-        for number, title in enumerate(TITLES, start=1):
-            page.get_by_role("dialog", name=f"{title} ({number} of 3)").wait_for(timeout=60_000)
-            assert page.evaluate(APART) or number == 1  # the drawing is the rest of the page
-            assert page.evaluate(
-                "document.querySelector('#ws-tour').contains(document.activeElement)"
-            )
-            page.keyboard.press("Enter")
-        page.wait_for_selector("#ws-tour", state="detached")
+        wait_until_open(page)
+        page.get_by_role("button", name="Got it").click()
+        assert hints_of(page) == []
         page.reload()
         wait_until_open(page)
-        assert page.locator("#ws-tour").count() == 0
-        page.keyboard.press("Control+k")
-        page.get_by_label("Find a command").fill("first steps")
-        page.keyboard.press("Enter")
-        page.wait_for_selector("#ws-tour .main:focus")  # once the window has given it back
-        page.keyboard.press("Escape")
-        page.wait_for_selector("#ws-tour", state="detached")
+        assert hints_of(page) == []
+        for hide in (
+            lambda: page.keyboard.press("Escape"),
+            lambda: page.get_by_role("tab", name="Measure").click(),
+            lambda: page.locator("#ws-left input[type=range]").first.press("ArrowRight"),
+        ):
+            page.keyboard.press("Control+k")
+            page.get_by_label("Find a command").fill("hints")
+            page.keyboard.press("Enter")
+            page.wait_for_selector(".ws-hint button:focus")
+            page.wait_for_selector("#ws-window:not([open])", state="attached")
+            assert len(hints_of(page)) == 3
+            hide()
+            assert hints_of(page) == []
 
 
 def test_words_of_a_scene_are_never_run(browser):

@@ -4,6 +4,7 @@ import random
 from dataclasses import replace
 
 import pytest
+from PIL import Image
 
 from app.parts import Alone, wait
 from warpspace.app.browser import actions as do
@@ -14,7 +15,8 @@ from warpspace.app.panels import page_panels
 from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
-from warpspace.scene.library import load_scene
+from warpspace.resources import scenes_dir
+from warpspace.scene.library import load_scene, scene_names
 from warpspace.scene.notes import Note
 
 FIRST, SECOND = load_scene("dvf5000_first"), load_scene("dvf5000_second")
@@ -36,10 +38,26 @@ def test_scenes_are_chosen_by_title_and_escaped():
     hostile = replace(FIRST, name="other", title=HOSTILE, description=HOSTILE)
     scenes = SceneList({scene.title: scene for scene in (FIRST, SECOND, hostile)})
     window = Alone(page_panels.ScenesDialog, STATE, scenes=scenes)
-    assert "<img" not in window.html
+    assert "<img src=x" not in window.html
     assert window.html.count('aria-current="true"') == 1
     assert window.do(do.Input.CHOOSE_SCENE("nothing of that name")).scene is FIRST
     assert window.do(do.Input.CHOOSE_SCENE(SECOND.title)).scene is SECOND
+
+
+def test_every_bundled_scene_has_a_small_picture_and_a_sentence():
+    pictures = sorted((scenes_dir() / "thumbnails").iterdir())
+    assert [path.name for path in pictures] == [f"{name}.webp" for name in sorted(scene_names())]
+    for path in pictures:
+        assert path.stat().st_size <= 6000
+        with Image.open(path) as picture:
+            assert (picture.format, picture.size) == ("WEBP", (160, 120))
+    scenes = SceneList({name: load_scene(name) for name in scene_names()})
+    window = Alone(page_panels.ScenesDialog, STATE, scenes=scenes)
+    assert window.html.count('src="data:image/webp;base64,') == len(scenes)
+    assert "…" not in window.html
+    opened, _ = scenes.add(replace(FIRST, title="own"))  # another scene under a bundled name
+    assert opened == "own"
+    assert window.html.count('src="data:image/webp;base64,') == len(scenes) - 1
 
 
 def test_every_key_is_there_once_and_none_without_ctrl_changes_the_model():

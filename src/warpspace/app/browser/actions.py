@@ -29,7 +29,7 @@ class Signal(StrEnum):
     UNDO = auto()
     REDO = auto()
     FIT_VIEW = auto()
-    START_TOUR = auto()
+    SHOW_HINTS = auto()
     CLOSE_DIALOG = auto()
     FIND_ERROR = auto()  # in the page only
     CHOOSE_FILES = auto()  # in the page only

@@ -4,6 +4,7 @@ Every text that is not `Markup` is escaped here. An element sends an action, see
 """
 
 import re
+from base64 import b64encode
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from html import escape
@@ -12,6 +13,8 @@ import msgspec
 from markupsafe import Markup
 
 from warpspace.app.browser.actions import AnyAction
+from warpspace.resources import scenes_dir
+from warpspace.scene.library import scene_names
 from warpspace.units import MINUS
 
 EMPTY = Markup("")
@@ -197,3 +200,13 @@ def menu(heading: object, body: object, *, key: str, kind: str = "", hint: str =
 def rows(pairs: Iterable[tuple[object, object]], kind: str = "ws-rows") -> Markup:
     body = join(fill("<tr><th>{head}</th><td>{value}</td></tr>", head=h, value=v) for h, v in pairs)
     return tag("table", body, class_=kind)
+
+
+@lru_cache(maxsize=64)
+def thumbnail(name: str) -> Markup:
+    """Render the picture of a bundled scene; an empty box for others."""
+    path = scenes_dir() / "thumbnails" / f"{name}.webp"
+    if name not in scene_names() or not path.is_file():
+        return tag("i", class_="ws-thumbnail")
+    data = b64encode(path.read_bytes()).decode()
+    return tag("img", class_="ws-thumbnail", src=f"data:image/webp;base64,{data}", alt="")

@@ -12,7 +12,9 @@
   shell.id = "ws-page";
   shell.innerHTML = `
     <header id="ws-top" data-piece="top"></header>
-    <nav id="ws-left" aria-label="Errors" data-piece="errors"></nav>
+    <nav id="ws-left" aria-label="Errors">
+      <p class="ws-hint" role="note">Drag a slider: the box deforms. <button type="button" class="ws-button">Got it</button></p>
+      <div data-piece="errors"></div></nav>
     <div id="ws-over" role="region" aria-label="Overlay of the drawing"><section class="ws-head" data-piece="head" aria-label="Summary"></section>
       <section class="ws-legend" data-piece="legend" aria-label="Colour legend"></section>
       <div class="ws-compared" data-piece="compared"></div>
@@ -20,10 +22,12 @@
       <div class="ws-labels" aria-hidden="true"></div><div class="ws-words" aria-hidden="true"></div>
       <div class="ws-foot"><div class="ws-controls" role="group" aria-label="Display settings"><div data-piece="controls"></div>
         <div data-piece="compare"></div></div>
-      <div class="ws-lengths"><div class="ws-triad" data-piece="triad"></div><div class="ws-bars"></div></div>
+      <div class="ws-lengths"><div class="ws-triad" data-piece="triad"></div><div class="ws-bars"></div>
+        <p class="ws-hint" role="note">Colours are true, the shape is exaggerated.</p></div>
       <div class="ws-playback" role="group" aria-label="Playback" data-piece="playback"></div></div></div>
     <section id="ws-story" aria-label="Story" aria-live="polite" data-piece="story"></section>
-    <aside id="ws-right" aria-label="Tasks" data-piece="tasks"></aside>
+    <aside id="ws-right" aria-label="Tasks"><p class="ws-hint" role="note">Pick a task.</p>
+      <div data-piece="tasks"></div></aside>
     <aside id="ws-notes" aria-label="Notes" data-piece="notes"></aside>
     <dialog id="ws-window" aria-labelledby="ws-window-title" data-piece="window"></dialog>
     <div id="ws-toasts" role="status" aria-live="polite" popover="manual"></div>`;
@@ -99,7 +103,7 @@
   const showWindow = dialog => {
     const filled = dialog.childElementCount > 0;
     if (filled && !dialog.open) { before = document.activeElement; dialog.showModal(); raiseToasts(); }
-    if (!filled && dialog.open) { dialog.close(); (document.querySelector("#ws-tour .main") ?? before)?.focus?.(); }
+    if (!filled && dialog.open) { dialog.close(); before?.focus?.(); }
   };
 
   const closeWindow = () => {  // without waiting for the server
@@ -405,7 +409,7 @@
     // progress of the page, for tests
     stage(word) {
       document.documentElement.dataset.warpspace = word;
-      if (word === "open") this.tour();
+      if (word === "open") this.hints();
     },
     // report when everything before it is drawn
     drawn() {

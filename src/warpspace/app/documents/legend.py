@@ -55,15 +55,11 @@ def marks(picture: LivePicture) -> list[LegendMark]:
         placed[i] = max(placed[i], placed[i - 1] + APART)
     for i in reversed(range(len(placed))):
         placed[i] = min(placed[i], 1.0 - APART * (len(placed) - 1 - beyond - i))
-    spelt = [
-        f"{name} {spell_short(value) if name == 'limit' else number(value)}{_beyond(value, high)}"
-        for name, value in named
+    spelt = [spell_short(value) if name == "limit" else number(value) for name, value in named]
+    return [
+        LegendMark(name, f"{name} {text}{' ↑' if value > high else ''}", height, name_at)
+        for (name, value), text, height, name_at in zip(named, spelt, at, placed, strict=True)
     ]
-    return list(map(LegendMark, [name for name, _ in named], spelt, at, placed))
-
-
-def _beyond(value: float, high: float) -> str:
-    return " ↑" if value > high else ""
 
 
 def ticks(scale: ColourScale, drawn: Array | None = None) -> list[tuple[str, float]]:

@@ -1,15 +1,12 @@
 """The task "Machine": axis positions, error motions of rotary axes, editor, library."""
 
-import base64
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from itertools import starmap
 
 from markupsafe import Markup
-from PIL import Image
 
 from warpspace.analysis.axis_motion import AxisMotion, assemble_motion
 from warpspace.app.browser import actions as do
@@ -28,7 +25,6 @@ from warpspace.bodies.mesh_files import check_meshes
 from warpspace.machine.definition import BodySource, Gantry
 from warpspace.picture.formatting import spell_at, spell_point
 from warpspace.picture.traces import TraceLine, evaluate_axis_motion, motion_lines
-from warpspace.scene.machine_library import machine_picture
 from warpspace.units import MICROMETRE, MINUS
 
 OPEN_MESH = "A mesh of this machine is not watertight; it is drawn unchanged."
@@ -375,8 +371,6 @@ def _source(source: BodySource) -> str:
 
 # --- The library: thumbnail, title and chain of each machine --------------------------------------
 
-WIDTH_PX = 240  # of a thumbnail; displayed smaller, for high-resolution screens
-
 
 class MachinesDialog(panel.Dialog):
     name, title = "machines", "Start from a machine"
@@ -385,9 +379,8 @@ class MachinesDialog(panel.Dialog):
         present = picture.state.scene.machine.name
         return tag("div", join(
             tag("button", join((
-                fill('<img src="{}" alt="" width="150">', thumbnail(name))
-                if thumbnail(name) else tag("i", "no picture"),
-                tag("b", scene.machine.title), tag("small", str(scene.machine.chain)),
+                html.thumbnail(scene.name), tag("b", scene.machine.title),
+                tag("small", str(scene.machine.chain)),
             )), type="button", data_do=do.Input.CHOOSE_MACHINE(name),
                 aria_current="true" if name == present else None)
             for name, scene in machine_edits.library().items()
@@ -401,19 +394,3 @@ class MachinesDialog(panel.Dialog):
         opened = machine_edits.with_library_scene(state, scene)
         self.context.call_soon(lambda: self.context.scenes.add(opened.origin) and None)
         return self.closed(replace(opened, page=state.page))
-
-
-@cache
-def thumbnail(name: str) -> str:
-    """Return the picture of a library machine as a data URL; empty if it has none."""
-    path = machine_picture(name)
-    if path is None:
-        return ""
-    with Image.open(path) as picture:
-        wide, high = picture.size  # the machine is at the left, below the title
-        box = (wide // 50, high // 6, wide * 11 // 20, high * 7 // 8)
-        small = picture.convert("RGB").crop(box)
-    small.thumbnail((WIDTH_PX, WIDTH_PX))
-    buffer = io.BytesIO()
-    small.save(buffer, "JPEG", quality=80)
-    return f"data:image/jpeg;base64,{base64.b64encode(buffer.getvalue()).decode()}"

@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from warpspace.analysis.registry import entries
 from warpspace.app.browser import actions as do
+from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, join, rows, tag, text_box, upload_button
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import machine_editor, overlay
@@ -42,7 +43,7 @@ from warpspace.bench.base import bench_names, find_test
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_UPLOAD_BYTES
 
-LONGEST_SENTENCE = 110
+LONGEST_SENTENCE = 130
 
 
 class StatePanel(Panel):
@@ -96,24 +97,25 @@ class TopPanel(Panel):
 
 
 class ScenesDialog(Dialog):
-    """The list of scenes: title, machine, description."""
+    """The list of scenes: picture, title, machine, description."""
 
     name, title = "scenes", "Select a scene"
 
     def body(self, picture: LivePicture) -> Markup:
+        bundled = {id(scene): scene.name for scene in self.context.scenes.fixed}
         scenes = (
-            tag("button", join((
+            tag("button", html.thumbnail(bundled.get(id(scene), "")) + tag("span", join((
                 tag("b", title),
                 tag("small", scene.machine.title) if scene.machine.title != title else EMPTY,
                 tag("small", shorten(re.split(r"\.\s", scene.description)[0].rstrip(" .\n"),
                                      LONGEST_SENTENCE, placeholder=" …"))
                 if scene.description else EMPTY,
-            )), type="button", data_do=do.Input.CHOOSE_SCENE(title),
+            ))), type="button", data_do=do.Input.CHOOSE_SCENE(title),
                 aria_current="true" if scene is picture.state.origin else None)
             for title, scene in self.context.scenes.items()
         )  # fmt: skip
         hint = quiet("To open a file, use Open in the top bar, or drop it on the page.")
-        return tag("div", join(scenes), class_="ws-list", data_list=True) + hint
+        return tag("div", join(scenes), class_="ws-list ws-scenes", data_list=True) + hint
 
     @on(do.Input.CHOOSE_SCENE)
     def choose(self, state: AppState, title: str) -> AppState | None:
@@ -179,7 +181,7 @@ COMMANDS = (
     Command("Reset all errors to the scene", do.Signal.RESET_ERRORS, keys=("ctrl+alt+r",)),
     Command("Include all errors", do.Signal.INCLUDE_ERRORS, keys=("ctrl+alt+l",)),
     Command("Help and all commands", do.Input.OPEN_DIALOG("help"), ("ctrl+k", "h", "?", "shift+?")),
-    Command("First steps", do.Signal.START_TOUR),
+    Command("Show the hints", do.Signal.SHOW_HINTS, search_terms="first steps tour"),
 )
 
 
@@ -305,9 +307,9 @@ class PagePanel(Panel):
     def fit_view(self) -> None:
         self.context.fit_view()
 
-    @on(do.Signal.START_TOUR)
-    def start_tour(self, state: AppState) -> AppState:
-        self.context.call_soon(partial(self.context.page.call, "tour", True))
+    @on(do.Signal.SHOW_HINTS)
+    def show_hints(self, state: AppState) -> AppState:
+        self.context.call_soon(partial(self.context.page.call, "hints", True))
         return put(state, "page.window", "")
 
     @on(do.Signal.CLOSE_DIALOG)
