@@ -36,7 +36,6 @@ from warpspace.app.panels.panel import (
     actions,
     alert,
     details,
-    later,
     on,
     setting,
 )
@@ -258,7 +257,7 @@ class AnalysisPanel(Section):
         if self.is_ready(state):
             self._run(state)
 
-    @later(do.Cancel)
+    @on(do.Cancel, later=True)
     def cancel(self, _: do.Cancel) -> None:
         self._jobs.cancel()
 
@@ -340,7 +339,7 @@ class AnalysisPanel(Section):
         self.problem = (self.last_key, text)
         self.rerender()
 
-    @later(do.SaveResult)
+    @on(do.SaveResult, later=True)
     def save(self, action: do.SaveResult) -> None:
         result = self.outcome.result if self.outcome else None
         if result is None or action.format not in _endings(result):
@@ -352,7 +351,7 @@ class AnalysisPanel(Section):
             csv.writer(text, lineterminator="\n").writerows(table.csv_rows())
         self.context.save_file(f"{self.name}.{action.format.lower()}", text.getvalue())
 
-    @later(do.AddToReport)
+    @on(do.AddToReport, later=True)
     def add_to_report(self, _: do.AddToReport) -> None:
         if self.outcome is not None:
             title = self.kind.title or self.title

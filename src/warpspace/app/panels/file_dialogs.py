@@ -17,17 +17,7 @@ from warpspace.app.documents.offline_page import build_offline_html, build_story
 from warpspace.app.evaluation.compare import drawn_tables, without_table
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.panel import (
-    Context,
-    Dialog,
-    Job,
-    Jobs,
-    actions,
-    later,
-    on,
-    quiet,
-    setting,
-)
+from warpspace.app.panels.panel import Context, Dialog, Job, Jobs, actions, on, quiet, setting
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
@@ -72,7 +62,7 @@ class JobDialog(Dialog):
 
         self._jobs.start(name, work)
 
-    @later(do.Cancel)
+    @on(do.Cancel, later=True)
     def cancel(self, _: do.Cancel) -> None:
         self._jobs.cancel()
 
@@ -127,7 +117,7 @@ class FilesDialog(JobDialog):
 
     # --- open ------------------------------------------------------------------------------------
 
-    @later(do.Upload)
+    @on(do.Upload, later=True)
     def open(self, upload: do.Upload) -> None:
         for panel, endings in transfers.IN_BOX.items():
             if upload.name.lower().endswith(endings):
@@ -152,14 +142,14 @@ class FilesDialog(JobDialog):
             self.context.call_soon(partial(show, opened, camera))
             self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
 
-    @later(do.Input.FOLLOW_LINK)
+    @on(do.Input.FOLLOW_LINK, later=True)
     def follow(self, link: str) -> None:
         opened = scene_file.open_link(transfers.unpack(link), self.context.scenes.fixed)
         self.context.show_opened(*opened)
 
     # --- save ------------------------------------------------------------------------------------
 
-    @later(do.Signal.SAVE_SCENE)
+    @on(do.Signal.SAVE_SCENE, later=True)
     def save(self) -> None:
         state, camera = self.context.state, self.context.camera.remember()
         text = self._alone_if_large(lambda state: scene_file.state_to_toml(state, camera))
@@ -203,14 +193,14 @@ class FilesDialog(JobDialog):
             self.context.notify("Comparison not included", str(error), "warning")
             return text
 
-    @later(do.Signal.SAVE_FIGURE)
+    @on(do.Signal.SAVE_FIGURE, later=True)
     def save_figure(self) -> None:
         draw, kind = self.context.services.draw_figure, self.context.state.page.figure
         kind = kind if kind in dict(self.context.services.figures) else ""
         ending = f"_{kind or 'figure'}.png"
         self.make("Figure", ending, lambda picture, job: draw(picture, kind, job))
 
-    @later(do.Signal.SAVE_VIEW)
+    @on(do.Signal.SAVE_VIEW, later=True)
     def save_view(self) -> None:
         client, camera = self.context.client, self.context.camera
 
@@ -224,20 +214,20 @@ class FilesDialog(JobDialog):
 
         self.make("Current view", "_view.png", draw, as_drawn=True)
 
-    @later(do.Signal.SAVE_PAGE)
+    @on(do.Signal.SAVE_PAGE, later=True)
     def save_page(self) -> None:
         toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
         build = partial(build_offline_html, provenance=toml, camera=self.context.camera.remember())
         self.make("Page", ".html", lambda picture, _: build(picture).encode(), as_drawn=True)
 
-    @later(do.Signal.SAVE_STORY)
+    @on(do.Signal.SAVE_STORY, later=True)
     def save_story(self) -> None:
         toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
         about = without_table(self.context.state), toml, self.context.scenes.fixed
         self.make("Story", "_story.html", lambda *_: build_story_html(*about).encode(),
                   as_drawn=True)  # fmt: skip
 
-    @later(do.Input.EXPORT)
+    @on(do.Input.EXPORT, later=True)
     def export(self, ending: str) -> None:
         services = self.context.services
         if ending in dict(services.exports):
@@ -297,12 +287,12 @@ class ReportDialog(JobDialog):
             quiet("To add more results, use “Add to report” below a result."),
         ))  # fmt: skip
 
-    @later(do.RemoveFromReport)
+    @on(do.RemoveFromReport, later=True)
     def remove(self, action: do.RemoveFromReport) -> None:
         del self.context.report_results[action.index : action.index + 1]
         self.rerender()
 
-    @later(do.WriteReport)
+    @on(do.WriteReport, later=True)
     def write(self, action: do.WriteReport) -> None:
         results: dict[str, Result] = {}
         for index, (title, added) in enumerate(self.context.report_results):

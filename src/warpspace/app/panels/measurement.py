@@ -23,18 +23,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import chosen_test, plan_test
 from warpspace.app.panels.analysis_panel import AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
-from warpspace.app.panels.panel import (
-    Context,
-    Job,
-    Jobs,
-    actions,
-    alert,
-    details,
-    later,
-    on,
-    quiet,
-    tiny,
-)
+from warpspace.app.panels.panel import Context, Job, Jobs, actions, alert, details, on, quiet, tiny
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import TEST, with_form
@@ -117,16 +106,16 @@ class FilesPanel(AnalysisPanel):
         self._upload_problem = error_words(error)
         self.rerender()
 
-    @later(do.Upload)
+    @on(do.Upload, later=True)
     def upload(self, action: do.Upload) -> None:
         self.receive(partial(read_upload, action, self.most_bytes, self.what))
 
-    @later(do.RemoveFile)
+    @on(do.RemoveFile, later=True)
     def remove_file(self, action: do.RemoveFile) -> None:
         self.files = (*self.files[: action.index], *self.files[action.index + 1 :])
         self.rerender()
 
-    @later(do.Cancel)
+    @on(do.Cancel, later=True)
     def cancel(self, _: do.Cancel) -> None:
         self._uploads.cancel()
         super().cancel(_)
@@ -324,18 +313,18 @@ class CalibratePanel(FilesPanel):
         folded = details_html(block for block in blocks if block not in visible)
         return join((arrows, status, *map(block_html, visible), folded))
 
-    @later(do.Input.SET_READING_KIND)
+    @on(do.Input.SET_READING_KIND, later=True)
     def set_kind(self, kind: str) -> None:
         self._next_kind = kind if kind in (*KINDS, *bench_names()) else ""
         self.rerender()
 
-    @later(do.Input.SET_TEST_OPTIONS)
+    @on(do.Input.SET_TEST_OPTIONS, later=True)
     def set_test_options(self, options: str) -> None:
         name = self._next_kind.partition(":")[0]
         self._next_kind = f"{name}:{options.strip()[:LONGEST_KIND]}".strip(":")
         self.rerender()
 
-    @later(do.Input.ADD_READINGS)
+    @on(do.Input.ADD_READINGS, later=True)
     def add_bundled(self, name: str) -> None:
         if name in bundled_data():
             self.receive(lambda: (name, find_data(name).read_bytes()))

@@ -24,7 +24,7 @@ from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.evaluation.point_explanation import explain_point, pick, pick_worst
 from warpspace.app.panels.conventions import with_travel
 from warpspace.app.panels.design import allowed_words
-from warpspace.app.panels.panel import Context, Panel, Refresh, later, on, setting, tiny
+from warpspace.app.panels.panel import Context, Panel, Refresh, on, setting, tiny
 from warpspace.app.panels.playback import share_words
 from warpspace.app.state.app_state import COMPARISON_VIEWS, COMPONENT_NAMES, NOBODY, AppState, Side
 from warpspace.app.state.leaf import Identity
@@ -139,7 +139,7 @@ class OverlayPanel(Panel):
         self._sent = facts
         return {}
 
-    @later(do.Resize)
+    @on(do.Resize, later=True)
     def resize(self, action: do.Resize) -> None:
         room = Room(*map(float, msgspec.structs.astuple(action)))
         self.context.camera.take_room(room, self.context.picture)
@@ -210,7 +210,7 @@ class PointerPanel(Panel):
         self._tabs, self._last = tabs, 0.0
         context.page.call("together")
 
-    @later(do.PointAt)
+    @on(do.PointAt, later=True)
     def point(self, action: do.PointAt) -> None:
         now, picture = time.monotonic(), self.context.picture
         if now - self._last < INTERVAL_S or self.context.story_state:
@@ -219,7 +219,7 @@ class PointerPanel(Panel):
         picked = picture and pick(picture, ray[0] / SCENE_PER_MM, ray[1])
         self._send(action.author, picked and (picked[1] * SCENE_PER_MM).round(4).tolist())
 
-    @later(do.Signal.POINTER_GONE)
+    @on(do.Signal.POINTER_GONE, later=True)
     def hide(self) -> None:
         self._send("", None)
 
@@ -317,12 +317,12 @@ class ControlsPanel(Panel):
     def set_travel(self, state: AppState, direction: str) -> AppState:
         return with_travel(state, direction)
 
-    @later(do.ViewFrom)
+    @on(do.ViewFrom, later=True)
     def view_from(self, action: do.ViewFrom) -> None:
         self.context.fit_view(action.view)
         self.rerender()
 
-    @later(do.SetOrthographic)
+    @on(do.SetOrthographic, later=True)
     def set_orthographic(self, action: do.SetOrthographic) -> None:
         self.context.fit_view(lens=action.value == "1")
         self.rerender()
@@ -447,7 +447,7 @@ class ComparePanel(Panel):
                 "compare": html.menu(label, join(body), key="compare", kind="up wide",
                                 hint="Compare two scenes, or errors before and after")}  # fmt: skip
 
-    @later(do.Signal.OPEN_COMPARISON)
+    @on(do.Signal.OPEN_COMPARISON, later=True)
     def open(self) -> None:
         self.context.page.call("menu", self.name)
 

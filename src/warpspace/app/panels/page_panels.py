@@ -23,17 +23,7 @@ from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog, accepte
 from warpspace.app.panels.improve import AdjustPanel, BestPanel, CompensatePanel
 from warpspace.app.panels.measurement import CalibratePanel, TestsPanel
 from warpspace.app.panels.note_panels import NoteNumbersPanel, NotesPanel, StoryPanel
-from warpspace.app.panels.panel import (
-    Context,
-    Dialog,
-    Panel,
-    Refresh,
-    Section,
-    details,
-    later,
-    on,
-    quiet,
-)
+from warpspace.app.panels.panel import Context, Dialog, Panel, Refresh, Section, details, on, quiet
 from warpspace.app.panels.playback import PlaybackPanel
 from warpspace.app.panels.upload_panels import ImportPanel, PartPanel, ProgramPanel
 from warpspace.app.state.app_state import AppState, Exclusions
@@ -295,15 +285,15 @@ class PagePanel(Panel):
         # an open dialog renders its own content
         return {} if picture.state.page.window else {"window": ""}
 
-    @later(do.Signal.UNDO)
+    @on(do.Signal.UNDO, later=True)
     def undo(self) -> None:
         self._go("undo", self.context.store.undo)
 
-    @later(do.Signal.REDO)
+    @on(do.Signal.REDO, later=True)
     def redo(self) -> None:
         self._go("redo", self.context.store.redo)
 
-    @later(do.Signal.FIT_VIEW)
+    @on(do.Signal.FIT_VIEW, later=True)
     def fit_view(self) -> None:
         self.context.fit_view()
 

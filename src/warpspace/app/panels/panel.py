@@ -204,35 +204,24 @@ ActionKind: TypeAlias = type[do.Action] | do.Signal | do.Input
 F = TypeVar("F", bound=Callable[..., AppState | None])
 
 
-def on(kind: ActionKind) -> Callable[[F], F]:
+def on(kind: ActionKind, *, later: bool = False) -> Callable[[F], F]:
     """Mark the handler of an action: ``method(state, action)`` returns the changed state, or None.
 
-    The handler of a `Signal` is called without it, that of an `Input` with its text.
+    A later one, ``method(action)``, leaves the state alone and is called after it is updated. That
+    of a `Signal` is called without the action, that of an `Input` with its text.
     """
 
     def mark(method: F) -> F:
-        vars(method)["kind"] = kind
+        vars(method).update(kind=kind, is_later=later)
         return method
-
-    return mark
-
-
-def later(kind: ActionKind) -> Callable[[F], F]:
-    """Mark the handler of an action that leaves the state alone: ``method(action)``.
-
-    It is called in the session, after the state is updated.
-    """
-
-    def mark(method: F) -> F:
-        vars(method)["is_later"] = True
-        return on(kind)(method)
 
     return mark
 
 
 class Panel:
     name: str = ""  # also in the `PanelAction`s for it
-    handlers: ClassVar[Mapping[object, str]] = {}  # names of methods, by kind of action
+    # method, and whether it is called later, by kind of action
+    handlers: ClassVar[Mapping[object, tuple[str, bool]]] = {}
     refresh: ClassVar[Refresh] = Refresh.DEBOUNCED
 
     def __init__(self, context: Context) -> None:
@@ -251,8 +240,9 @@ class Panel:
         return {}
 
     def __init_subclass__(cls) -> None:
-        marked = {name: method for name, method in vars(cls).items() if hasattr(method, "kind")}
-        cls.handlers = {**cls.handlers, **{method.kind: name for name, method in marked.items()}}
+        own = {method.kind: (name, method.is_later) for name, method in vars(cls).items()
+               if hasattr(method, "is_later")}  # fmt: skip
+        cls.handlers = {**cls.handlers, **own}
 
     def handles(self, action: do.AnyAction) -> bool:
         return (
@@ -263,10 +253,11 @@ class Panel:
         """Handle an action; those of other panels change nothing."""
         if not self.handles(action):
             return state
-        method: Any = getattr(self, self.handlers[do.kind_of(action)])
+        name, is_later = self.handlers[do.kind_of(action)]
+        method: Any = getattr(self, name)
         value = action.value if isinstance(action, do.InputValue) else action
         values = () if isinstance(action, do.Signal) else (value,)
-        if not hasattr(method, "is_later"):
+        if not is_later:
             return method(state, *values) or state
         self.context.call_soon(partial(method, *values))
         return state

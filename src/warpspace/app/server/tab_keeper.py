@@ -24,7 +24,7 @@ from warpspace.app.documents.transfers import safe_name
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.compare import without_table
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.panel import Context, Panel, Refresh, later
+from warpspace.app.panels.panel import Context, Panel, Refresh, on
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.app.state.store import StateStore
 from warpspace.exceptions import OptionError, WarpspaceError
@@ -186,7 +186,7 @@ class TabKeeper(Panel):
         context.page.call("server.keep", text)
         return {}
 
-    @later(do.StoredCopy)
+    @on(do.StoredCopy, later=True)
     def restore(self, action: do.StoredCopy) -> None:
         if not self._awaits_copy:
             return
