@@ -22,7 +22,8 @@ HINTS = """() => {
     .map(node => node.getBoundingClientRect()).filter(box => box.width && box.height);
   const hints = [...document.querySelectorAll(".ws-hint")];
   const others = [...document.querySelectorAll("button, input, select, summary, [role=tab],"
-    + " .ws-head > *, .ws-legend > b, .ws-scale, .ws-scale i, .ws-error, .ws-section, .ws-triad")]
+    + " .ws-head > *, .ws-legend > b, .ws-scale, .ws-scale i, .ws-words > span, .ws-error,"
+    + " .ws-section, .ws-triad")]
     .filter(node => !node.closest(".ws-hint"));
   return [boxes(hints), boxes(others)].map(
     list => list.map(({ left, top, right, bottom }) => [left, top, right, bottom]));
