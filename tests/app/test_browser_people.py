@@ -72,6 +72,7 @@ def test_hints_are_shown_once_and_hidden_by_their_button_esc_or_first_use(viewer
             lambda: page.get_by_role("tab", name="Measure").click(),
             lambda: page.locator("#ws-left input[type=range]").first.press("ArrowRight"),
         ):
+            page.locator("#ws-task-understand").focus()
             page.keyboard.press("Control+k")
             page.get_by_label("Find a command").fill("hints")
             page.keyboard.press("Enter")

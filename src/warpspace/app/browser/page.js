@@ -103,7 +103,7 @@
   const showWindow = dialog => {
     const filled = dialog.childElementCount > 0;
     if (filled && !dialog.open) { before = document.activeElement; dialog.showModal(); raiseToasts(); }
-    if (!filled && dialog.open) { dialog.close(); before?.focus?.(); }
+    if (!filled && dialog.open) { dialog.close(); (document.querySelector(".ws-hints .ws-hint button") ?? before)?.focus?.(); }
   };
 
   const closeWindow = () => {  // without waiting for the server
