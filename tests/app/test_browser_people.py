@@ -24,7 +24,8 @@ HINTS = """() => {
     .map(node => node.getBoundingClientRect()).filter(box => box.width && box.height);
   const hints = [...document.querySelectorAll(".ws-hint")];
   const others = [...document.querySelectorAll("button, input, select, summary, [role=tab],"
-    + " .ws-head > *, .ws-legend > b, .ws-scale, .ws-scale i, .ws-error, .ws-section, .ws-triad")]
+    + " .ws-head > *, .ws-legend > b, .ws-scale, .ws-scale i, .ws-words > span, .ws-error,"
+    + " .ws-section, .ws-triad")]
     .filter(node => !node.closest(".ws-hint"));
   return [boxes(hints), boxes(others)].map(
     list => list.map(({ left, top, right, bottom }) => [left, top, right, bottom]));
@@ -73,6 +74,7 @@ def test_hints_are_shown_once_and_hidden_by_their_button_esc_or_first_use(viewer
             lambda: page.get_by_role("tab", name="Measure").click(),
             lambda: page.locator("#ws-left input[type=range]").first.press("ArrowRight"),
         ):
+            page.locator("#ws-task-understand").focus()
             page.keyboard.press("Control+k")
             page.get_by_label("Find a command").fill("hints")
             page.keyboard.press("Enter")

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from products import pairwise
-from visual.reading import read_map
+from visual.reading import invert_colours, read_map
 from warpspace import load_scene
 from warpspace.geometry.colour import component_values
 from warpspace.outputs.drawing.settings import FigureSettings
@@ -112,3 +112,27 @@ def test_the_png_holds_the_very_pixels(truth):
     body = drawn.raster.reduced()
     same = (shown == body[..., :3]).all(axis=-1) & (body[..., 3] == 255)
     assert same.sum() > 0.55 * (body[..., 3] == 255).sum()
+
+
+def test_the_surface_is_hatched_above_the_limit_only(truth):
+    limit = 40.0
+    plain, hatched = (
+        draw_figure("error-map", [scene], FigureSettings())
+        for scene in (truth.scene, replace(truth.scene, limit_um=limit))
+    )
+    before, after = (
+        np.asarray(Image.open(io.BytesIO(figure_bytes(drawing, "png"))).convert("RGB")).astype(int)
+        for drawing in (plain, hatched)
+    )
+    raster, scale = plain.maps[0].raster, plain.maps[0].picture.scale
+    left, _, _, top = (round(value) for value in raster.rect)
+    body = raster.reduced()
+    rows, columns = (
+        slice(len(before) - top, len(before) - top + len(body)),
+        slice(left, left + body.shape[1]),
+    )
+    changed = (np.abs(after - before)[rows, columns] > 60).any(axis=-1) & (body[..., 3] == 255)
+    values = invert_colours(body[changed][:, :3].astype(float), scale)
+    assert len(values) > 2000
+    assert values.min() > limit - 2.0  # the width of the line
+    assert values.max() > 50.0

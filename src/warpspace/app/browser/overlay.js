@@ -118,7 +118,7 @@
   });
   const touches = (shape, { x, y, w, h }) => [[0, 0], [1, 0], [0, 1], [1, 1], [.5, .5], [.5, 0], [.5, 1]]
     .some(([u, v]) => within(shape, x + u * w, y + v * h));
-  const occupied = () => ["head", "legend", "controls", "bars", "triad", "compared"].map(part)
+  const occupied = () => ["head", "legend", "controls", "bars", "hint", "triad", "compared"].map(part)
     .filter(node => node?.offsetWidth)
     .map(node => {
       let x = 0, y = 0;

@@ -26,7 +26,7 @@
         <p class="ws-hint" role="note">Colours are true, the shape is exaggerated.</p></div>
       <div class="ws-playback" role="group" aria-label="Playback" data-piece="playback"></div></div></div>
     <section id="ws-story" aria-label="Story" aria-live="polite" data-piece="story"></section>
-    <aside id="ws-right" aria-label="Tasks"><p class="ws-hint" role="note">Pick a task.</p>
+    <aside id="ws-right" aria-label="Tasks"><p class="ws-hint" role="note">Pick one of five tasks.</p>
       <div data-piece="tasks"></div></aside>
     <aside id="ws-notes" aria-label="Notes" data-piece="notes"></aside>
     <dialog id="ws-window" aria-labelledby="ws-window-title" data-piece="window"></dialog>
@@ -103,7 +103,7 @@
   const showWindow = dialog => {
     const filled = dialog.childElementCount > 0;
     if (filled && !dialog.open) { before = document.activeElement; dialog.showModal(); raiseToasts(); }
-    if (!filled && dialog.open) { dialog.close(); before?.focus?.(); }
+    if (!filled && dialog.open) { dialog.close(); (document.querySelector(".ws-hints .ws-hint button") ?? before)?.focus?.(); }
   };
 
   const closeWindow = () => {  // without waiting for the server
