@@ -36,7 +36,7 @@ ORDER = (
     "design_review",
 )
 """What comes first in the gallery; other examples follow in the order of their names."""
-TOOLS = ("convention_drawings", "screenshots")
+TOOLS = ("convention_drawings", "screenshots", "thumbnails")
 """Scripts beside the examples that take the pictures of the pages."""
 FRAME_PX = 560
 
