@@ -167,8 +167,7 @@ def limit_pieces(picture: Picture, limit: float) -> tuple[Pieces, Pieces]:
         for pieces, (ends, of) in zip(lines, drawn, strict=True):
             lifts = (ISOLINE_LIFT * lift * normals[of][:, None] for lift in part.lifts)
             pieces += [(ends + off).astype(np.float32) for off in lifts]
-    line, hatching = map(np.concatenate, lines)
-    return line, hatching
+    return np.concatenate(lines[0]), np.concatenate(lines[1])
 
 
 def _joined(parts: list[Pieces]) -> Pieces:
