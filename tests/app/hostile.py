@@ -4,8 +4,8 @@ import asyncio
 import base64
 import contextlib
 import secrets
-from collections.abc import AsyncGenerator
-from typing import Literal, get_args, get_origin
+from collections.abc import AsyncGenerator, Iterable
+from typing import Any, Literal, get_args, get_origin
 
 import msgspec
 import websockets
@@ -25,7 +25,8 @@ PATHS = (
     "look.slices_mm.X", "shown.dark", "specification.limit_um", "machine.linear_mm.X", "scene",
     "__class__", "amplitudes.EXX", "page.task", "page.open", "", ".", "look.", "a." * 70,
 )  # fmt: skip
-FIELDS = {
+TURNS = 12
+FIELDS: dict[str, tuple[Any, ...]] = {
     "panel": ("files", "test", "part", "nobody", TAG, "__class__"),
     "option": ("fit", "x" * 41, TAG), "name": ("x.toml", TAG, "../../etc/passwd", "a.stl"),
     "token": ("", TAG),
@@ -38,21 +39,25 @@ FIELDS = {
 """What a field may hold; of those that are not listed, and allow any text, `VALUES`."""
 
 
-def actions(turns: int = 12) -> list[do.AnyAction]:
+def actions(panels: Iterable[str] = FIELDS["panel"]) -> list[do.AnyAction]:
     """Give actions that pass the decoder and mean nothing: of every kind, with any values."""
     found: list[do.AnyAction] = [*do.Signal]
-    for turn in range(turns):
+    of_panels = [(kind, {"panel": name}) for kind in do.PanelAction.__subclasses__()
+                 for name in panels]  # fmt: skip
+    others = {*do.Action.__subclasses__()} - {do.PanelAction, do.InputValue, do.SetLeaf}
+    for turn in range(TURNS):
+        of_value = [(turn + at, at) for at in range(len(PATHS))]
+        found += [do.SetLeaf(PATHS[at], VALUES[of % len(VALUES)]) for of, at in of_value]
         found += [entry(VALUES[(turn + at) % len(VALUES)]) for at, entry in enumerate(do.Input)]
-        for kind in do.Action.__subclasses__() + do.PanelAction.__subclasses__():
-            if kind in (do.PanelAction, do.InputValue):
-                continue
+        rare = of_panels if turn % 4 == 0 else []
+        for kind, given in (*rare, *((kind, {}) for kind in others)):
             values = {}
             for at, field in enumerate(msgspec.structs.fields(kind)):
                 texts = [value[:40] if field.type is do.Name else value for value in VALUES]
                 allowed = get_args(field.type) if get_origin(field.type) is Literal else texts
                 choices = FIELDS.get(field.name, allowed)
                 values[field.name] = choices[(turn + at) % len(choices)]
-            found.append(kind(**values))
+            found.append(kind(**values | given))
     return found
 
 

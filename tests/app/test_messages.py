@@ -13,7 +13,7 @@ import psutil
 import pytest
 from viser import _messages as messages
 
-from app.hostile import actions, camera, nonsense, upload
+from app.hostile import FIELDS, actions, camera, nonsense, upload
 from app.wire import Wire, opened
 from app.wire import dial as dial_viewer
 from page_client import CAMERA, App, dial, pack, said, until
@@ -143,7 +143,7 @@ def test_every_action_is_decoded_and_handled_by_one_panel_or_by_the_session():
 
 def test_actions_without_meaning_are_refused_in_words_and_the_page_goes_on(caplog):
     with opened(load_scene("dvf5000_first"), services=build_services()) as (wire, session):
-        sent = actions()
+        sent = actions([*session.display.panels, *FIELDS["panel"]])
         for at in range(0, len(sent), MOST_EVENTS):
             wire.send(said(*sent[at : at + MOST_EVENTS]))
             time.sleep(0.01)  # no faster than a page may
