@@ -100,6 +100,15 @@ def test_the_box_has_the_field_of_the_command(name, points, loop, orientation):
     assert given.after_statistics == compensate(SCENE, asked).after_statistics
 
 
+def test_before_and_residual_error_are_those_of_the_heading():
+    found, start = compensate(SCENE, Compensate(formats=("fanuc-3d",))), start_state(SCENE)
+    before = LIVE.evaluate(start).statistics.four
+    assert found.before_statistics.four == pytest.approx(before, abs=5e-3)  # exact chain
+    box = improve.with_box(start, improve.COMPARISON, found.controller)
+    for state in (box, improve.with_box(start, improve.RESIDUAL, found.controller)):
+        assert LIVE.evaluate(state).statistics.four == pytest.approx(found.after_statistics.four)
+
+
 def test_the_machine_may_drift_under_its_table(left, controller):
     drifted = left.with_amplitude("EXX", 7.0).with_amplitude("EA0Z", -12.0)
     grid = build_grid(SCENE.model, SCENE.workspace, 9)

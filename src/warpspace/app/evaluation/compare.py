@@ -9,8 +9,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
-from warpspace.app.state.app_state import PRESENT, AppState, Comparison, Side, start_state
+from warpspace.app.state.app_state import (
+    PRESENT,
+    START_NODES,
+    AppState,
+    Comparison,
+    Side,
+    start_state,
+)
 from warpspace.app.state.look import RotaryLook
+from warpspace.field.grid import RESIDUAL_NODES
 from warpspace.geometry.colour import ColourScale
 from warpspace.picture.model import choose_scale, same_nodes, subtract_pictures, subtract_traces
 from warpspace.scene.model import Scene
@@ -20,7 +28,7 @@ BEFORE, AFTER = "before", "after"
 DIGITS = 3  # decimals of a proposed error, µm or µrad
 LOOKED_AT = (
     "component", "nodes", "exaggeration", "look", "machine", "shown", "part", "forms", "picked",
-    "lever",
+    "lever", "specification",
 )  # fmt: skip
 """Fields of the present state that apply to both sides."""
 REFUSED = "The working volumes differ, so no difference can be computed node by node."
@@ -41,6 +49,8 @@ def side_state(now: AppState, side: Side) -> AppState:
         comparison=Comparison(),
         **{name: getattr(now, name) for name in LOOKED_AT},
     )
+    if drawn_tables(now) and now.nodes == START_NODES:  # both sides, for their difference
+        viewed = replace(viewed, nodes=RESIDUAL_NODES)
     return viewed.within_reach()
 
 

@@ -43,6 +43,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import LONGEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
 from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.field.grid import DEFAULT_NODES
 from warpspace.machine.axes import parameter
 from warpspace.picture.formatting import spell_at
 from warpspace.scene.model import Scene
@@ -117,6 +118,9 @@ class AnalysisPanel(Section):
         state_values["placed"] = str(int(state.view_key[1]))
         if state.picked is not None:
             state_values["at"] = spell_at(state.picked.at)
+        for option in self.options():  # statistics are those of the drawn grid
+            if option.name in ("grid", "nodes") and option.default == DEFAULT_NODES:
+                state_values[option.name] = str(min(state.nodes, int(option.high or state.nodes)))
         return {o.name: state_values[o.name] for o in self.options() if o.name in state_values}
 
     def scenes(self, state: AppState) -> Sequence[Scene]:
