@@ -15,8 +15,10 @@ from warpspace.analysis.blocks import Band, Curve, Lines
 from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, fill, join, tag
+from warpspace.app.evaluation.compare import plain_state, without_table
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import lines_html
+from warpspace.app.panels.file_dialogs import PLAIN
 from warpspace.app.panels.panel import Context, Panel, Refresh, actions, on, quiet, tiny
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
@@ -309,7 +311,7 @@ class ErrorsPanel(Panel):
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         state = picture.state
         inputs = (Identity(state.scene), state.view_key, tuple(state.positions.items()))
-        gains = self._gains.get(inputs, lambda: _gains(picture, state))
+        gains = self._gains.get(inputs, lambda: _gains(picture))
         ranking = self._rank(state, gains)
         listed = (ranking.order, ranking.used, bool(state.changed_keys))
         inputs = (*listed, state.page, state.exclusions)
@@ -485,11 +487,14 @@ def _spans(state: AppState) -> dict[str, Span]:
     return {key: widest[parameter(key).kind] for key in state.amplitudes}
 
 
-def _gains(picture: LivePicture, state: AppState) -> dict[str, float]:
-    """Compute the RMS effect of a unit of each error, µm.
+def _gains(picture: LivePicture) -> dict[str, float]:
+    """Compute the RMS effect of a unit of each error of the present state, µm.
 
     Over the volume; of an error of a rotary axis over its traces where that is more.
     """
+    if picture.compared is not None:  # another state may be drawn
+        picture = PLAIN.evaluate(without_table(plain_state(picture.state)))
+    state = picture.state
     basis = grid_basis(state.scene, picture.grid, picture.view)
     squares = np.sum(basis.position**2, axis=-1).reshape(len(basis.keys), -1)
     rms = np.sqrt(squares @ picture.grid.weights.reshape(-1))
