@@ -177,8 +177,14 @@ def test_rows_are_those_of_the_present_errors_whatever_is_drawn():
     rows = pieces(ErrorsPanel, START)
     for other in ("fork_head_bc", "teach_pitching_axis"):  # one with another chain
         compared = with_sides(START, scene_side(load_scene(other)), Side())
-        compared = put(compared, "compare.shown", "a")
-        assert pieces(ErrorsPanel, compared) == rows
+        compared = put(compared, "comparison.shown", "a")
+        shown = pieces(ErrorsPanel, compared)
+        assert f"For the present errors; the drawing shows A: {compared.comparison.a.title}." in (
+            shown.pop("errors")
+        )
+        assert shown == {name: row for name, row in rows.items() if name != "errors"}
+    present = put(compared, "comparison.shown", "b")
+    assert "the drawing shows" not in pieces(ErrorsPanel, present)["errors"]
 
 
 def test_comparing_is_shown_and_left_by_one_switch():

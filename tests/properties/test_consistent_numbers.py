@@ -257,6 +257,9 @@ def check_sections(picture, mean, largest) -> None:
         if not picture.is_difference and drawn.controller is None:
             near(numbers_after("point:", worst) or [0.0], largest)
     rows = ErrorsPanel(None).render(picture)
+    chosen, view = state.comparison, picture.compared and picture.compared.view
+    others = {"difference": True, "a": chosen.a.state, "b": chosen.b and chosen.b.state}
+    assert ("the drawing shows" in rows["errors"]) is (others.get(view) is not None)
     for key, value in state.amplitudes.items():
         stated = re.search(r'data-text="([^"]*)"', rows[f"error.{key}"])[1]
         assert float(stated.replace("\N{MINUS SIGN}", "-")) == pytest.approx(value)

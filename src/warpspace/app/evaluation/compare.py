@@ -204,6 +204,14 @@ def without_words(state: AppState) -> str:
     return WITHOUT.format(names) if names else ""
 
 
+def present_words(picture: LivePicture) -> str:
+    """Return the remark that numbers are not those of what is drawn; empty where they are."""
+    drawn = (
+        picture.other_title and f"For the present errors; the drawing shows {picture.other_title}."
+    )
+    return drawn or without_words(picture.state)
+
+
 def without_table(state: AppState) -> AppState:
     """Return a state without table, and without a comparison or pinned state that has one."""
     if not drawn_tables(state):

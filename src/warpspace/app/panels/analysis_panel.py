@@ -38,6 +38,7 @@ from warpspace.app.panels.panel import (
     details,
     on,
     setting,
+    tiny,
 )
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import LONGEST, option_values, read_form
@@ -177,10 +178,11 @@ class AnalysisPanel(Section):
         return {**defaults, **chosen, **{k: defaults[k] for k in OF_STATE & defaults.keys()}}
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
-        return (self.result_key(picture.state),)
+        return (self.result_key(picture.state), compare.present_words(picture))
 
     def body(self, picture: LivePicture) -> Markup:
-        return self._body(picture.state)
+        words = compare.present_words(picture)
+        return (tiny(words) if words else EMPTY) + self._body(picture.state)
 
     def _body(self, state: AppState) -> Markup:
         key, is_automatic = self.result_key(state), self.is_automatic(state)
@@ -220,6 +222,8 @@ class AnalysisPanel(Section):
         outcome, cards = self.outcome, list[Markup]()
         if outcome is None:
             return EMPTY
+        if key == self._applied_key != outcome.key:
+            return EMPTY  # applied, not offered again
         hints = {do.Preview: "Compare the result with the current state",
                  do.Apply: "Change the errors; the current state becomes A"}  # fmt: skip
         for index in self.offered_changes(outcome.result):

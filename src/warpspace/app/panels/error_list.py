@@ -15,7 +15,7 @@ from warpspace.analysis.blocks import Band, Curve, Lines
 from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, fill, join, tag
-from warpspace.app.evaluation.compare import plain_state, without_table
+from warpspace.app.evaluation.compare import plain_state, present_words, without_table
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import lines_html
 from warpspace.app.panels.file_dialogs import PLAIN
@@ -314,8 +314,8 @@ class ErrorsPanel(Panel):
         gains = self._gains.get(inputs, lambda: _gains(picture))
         ranking = self._rank(state, gains)
         listed = (ranking.order, ranking.used, bool(state.changed_keys))
-        inputs = (*listed, state.page, state.exclusions)
-        errors = self._list.get(inputs, lambda: _list_html(state, ranking))
+        inputs = (*listed, state.page, state.exclusions, picture.other_title)
+        errors = self._list.get(inputs, lambda: _list_html(picture, ranking))
         return {"errors": errors, **self._render_rows(state, ranking, gains)}
 
     def _rank(self, state: AppState, gains: Mapping[str, float]) -> Ranking:
@@ -397,8 +397,9 @@ class ErrorsPanel(Panel):
         return replace(state, page=replace(state.page, row=row))
 
 
-def _list_html(state: AppState, ranking: Ranking) -> str:
-    query, used = state.page.query, ranking.used
+def _list_html(picture: LivePicture, ranking: Ranking) -> str:
+    state, used = picture.state, ranking.used
+    query = state.page.query
     matches = find_parameters(query, ranking.order) if query.strip() else used
     listed = [key for key in ranking.order if key in matches]
     zero = [] if query.strip() else [key for key in ranking.order if key not in matches]
@@ -433,7 +434,8 @@ def _list_html(state: AppState, ranking: Ranking) -> str:
         menu = tag("details", summary + tag("div", buttons), class_="ws-menu")
     head = tag("div", find + menu, class_="ws-find")
     body = tag("div", places, class_="ws-errors", data_leave=do.Signal.SORT_ERRORS)
-    return head + quiet(join(excluded)) + body
+    remark = tiny(present_words(picture)) if picture.other_title else EMPTY
+    return head + remark + quiet(join(excluded)) + body
 
 
 def _places(keys: list[str], row: str) -> Markup:

@@ -240,7 +240,10 @@ class CompensatePanel(AnalysisPanel):
         return with_box(state, action.box, result.controller)
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
-        return (*super().body_dependencies(picture), box_of(picture.state))
+        return (self.result_key(picture.state), box_of(picture.state))
+
+    def body(self, picture: LivePicture) -> Markup:
+        return self._body(picture.state)  # with and without its table
 
     def _draw(self, result: Compensation, *, dark: bool, saves: bool) -> None:
         draw = self.context.services.draw_compensation
