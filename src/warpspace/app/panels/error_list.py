@@ -183,7 +183,9 @@ def edit_curve(state: AppState, action: do.EditCurve) -> tuple[AppState, CurveEd
 
 def origin_words(state: AppState, key: str) -> tuple[str, bool]:
     """Describe the origin of an error; return also if it differs from the scene as opened."""
-    scene, scene_curve = state.origin, state.own_curves.get(key)
+    scene, scene_curve, chain = state.origin, state.own_curves.get(key), state.scene.machine.chain
+    if chain != scene.machine.chain:  # measured on another machine
+        scene = replace(scene, uncertainty={}, measured={})
     uncertainty, measurement = scene.uncertainty.get(key), scene.measured.get(key)
     if scene_curve is None:
         text = "zero, not specified in the scene"
@@ -194,6 +196,8 @@ def origin_words(state: AppState, key: str) -> tuple[str, bool]:
         text = f"fitted to measurements, file {scene.name}"
     else:
         text = "assumed: specified without readings"
+    if chain != state.origin.machine.chain:
+        text += f", for the chain {state.origin.machine.chain}"
     if uncertainty is not None:
         text += f"; u = {spell(abs(uncertainty.amplitude))} {parameter(key).unit} (k = 1)"
     curve, scene_curve = state.curve(key), scene_curve or Constant(state.axis_span(key))
