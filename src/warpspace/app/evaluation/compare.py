@@ -9,16 +9,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
-from warpspace.app.state.app_state import (
-    PRESENT,
-    START_NODES,
-    AppState,
-    Comparison,
-    Side,
-    start_state,
-)
+from warpspace.app.state.app_state import PRESENT, AppState, Comparison, Side, start_state
 from warpspace.app.state.look import RotaryLook
-from warpspace.field.grid import RESIDUAL_NODES
+from warpspace.field.grid import DEFAULT_NODES, RESIDUAL_NODES
 from warpspace.geometry.colour import ColourScale
 from warpspace.picture.model import choose_scale, same_nodes, subtract_pictures, subtract_traces
 from warpspace.scene.model import Scene
@@ -49,7 +42,7 @@ def side_state(now: AppState, side: Side) -> AppState:
         comparison=Comparison(),
         **{name: getattr(now, name) for name in LOOKED_AT},
     )
-    if drawn_tables(now) and now.nodes == START_NODES:  # both sides, for their difference
+    if drawn_tables(now) and now.nodes == DEFAULT_NODES:  # both sides, for their difference
         viewed = replace(viewed, nodes=RESIDUAL_NODES)
     return viewed.within_reach()
 
@@ -206,10 +199,9 @@ def without_words(state: AppState) -> str:
 
 def present_words(picture: LivePicture) -> str:
     """Return the remark that numbers are not those of what is drawn; empty where they are."""
-    drawn = (
-        picture.other_title and f"For the present errors; the drawing shows {picture.other_title}."
-    )
-    return drawn or without_words(picture.state)
+    if picture.other_title:
+        return f"For the present errors; the drawing shows {picture.other_title}."
+    return without_words(picture.state)
 
 
 def without_table(state: AppState) -> AppState:

@@ -38,7 +38,6 @@ from warpspace.app.panels.panel import (
     details,
     on,
     setting,
-    tiny,
 )
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import LONGEST, option_values, read_form
@@ -182,7 +181,8 @@ class AnalysisPanel(Section):
 
     def body(self, picture: LivePicture) -> Markup:
         words = compare.present_words(picture)
-        return (tiny(words) if words else EMPTY) + self._body(picture.state)
+        remark = tag("p", words, class_="ws-tiny") if words else EMPTY
+        return remark + self._body(picture.state)
 
     def _body(self, state: AppState) -> Markup:
         key, is_automatic = self.result_key(state), self.is_automatic(state)
