@@ -223,10 +223,9 @@ def evaluate_before_after(controller: Controller, grid: Grid, direction: str) ->
     after = controller.field(grid.coordinates, grid.nominal_mm, scene)
 
     def before(nodes: Grid) -> tuple[ErrorField, FieldUncertainty | None]:
-        at = nodes.coordinates
+        at, point, weights = nodes.coordinates, nodes.point_mm, nodes.weights
         field = uncompensated.field(at, nodes.nominal_mm, scene)
-        known = field_uncertainty(scene, field.error_um, at, view, nodes.point_mm, nodes.weights)
-        return field, known
+        return field, field_uncertainty(scene, field.error_um, at, view, point, weights)
 
     mapped = build_grid(scene.model, scene.workspace)
     field, uncertainty = before(grid)
