@@ -104,4 +104,4 @@ def answer_of(part: Any, state: AppState) -> Any:
 
 def section(part: Any, state: AppState) -> str:
     """Give what stands below the title of a section."""
-    return str(part.body(SimpleNamespace(state=state)))
+    return str(part.body(SimpleNamespace(state=state, other_title="")))

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.parts import answer_of, lone_part, section
+from app.parts import Alone, answer_of, lone_part, section
 from still_scenes import still_scene
 from warpspace.app.browser import actions as do
 from warpspace.app.documents.legend import picture_conditions, subject_words
@@ -24,8 +24,9 @@ from warpspace.app.evaluation.machine_bodies import tool_point
 from warpspace.app.evaluation.machine_edits import with_changed_scene
 from warpspace.app.evaluation.point_explanation import measure_distance, pick_worst, with_picked
 from warpspace.app.panels import improve
-from warpspace.app.panels.analysis_panel import AnalysisOutcome
+from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPanel
 from warpspace.app.panels.conventions import with_reference
+from warpspace.app.panels.measurement import TestsPanel
 from warpspace.app.server.tab_keeper import NO_TABLE, page_copy_text, read_page_copy
 from warpspace.app.state.app_state import PartLook, start_state
 from warpspace.app.state.tree import put
@@ -98,6 +99,30 @@ def test_the_box_has_the_field_of_the_command(name, points, loop, orientation):
     tilts = picture.field.orientation_urad - command.after.orientation_urad
     assert np.abs(tilts).max() < 1e-9
     assert given.after_statistics == compensate(SCENE, asked).after_statistics
+
+
+def test_before_and_residual_error_are_those_of_the_heading():
+    found, start = compensate(SCENE, Compensate(formats=("fanuc-3d",))), start_state(SCENE)
+    before = LIVE.evaluate(start).statistics.four
+    assert found.before_statistics.four == pytest.approx(before, abs=5e-3)  # exact chain
+    box = improve.with_box(start, improve.COMPARISON, found.controller)
+    for state in (box, improve.with_box(start, improve.RESIDUAL, found.controller)):
+        assert LIVE.evaluate(state).statistics.four == pytest.approx(found.after_statistics.four)
+
+
+def test_an_uncompensated_test_is_not_drawn_in_a_compensated_box(left):
+    test, bare = {"test": "circular"}, replace(START, forms={"test": "circular"})
+    boxed, plain = LIVE.evaluate(replace(left, forms=test)), LIVE.evaluate(bare)
+    assert plain.bench is not None
+    assert boxed.bench is None
+    shown = str(Alone(TestsPanel, boxed.state).part.body(boxed))
+    assert without_words(left) in shown
+    assert "path is not drawn" in shown
+    assert "not drawn" not in str(Alone(TestsPanel, bare).part.body(plain))
+    # so do other analyses
+    analysis = lone_part(AnalysisPanel, "conformance")
+    assert without_words(left) in str(analysis.body(LIVE.evaluate(left)))
+    assert "compensation table" not in str(analysis.body(LIVE.evaluate(START)))
 
 
 def test_the_machine_may_drift_under_its_table(left, controller):

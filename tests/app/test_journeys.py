@@ -55,7 +55,7 @@ def test_why_the_worst_corner_is_off_and_the_best_adjustment_in_two_actions(tab)
 
 def test_95_percent_within_40_um_in_three_actions_in_sight(tab):
     tab.task("Design")
-    tab.says("of the machines stay within")
+    tab.says("Set a limit for the share of the machines that meet it.")
     tab.type("|E| allowed", "40")
     tab.click("Allocate tolerances")
     assert tab.actions <= 3

@@ -22,6 +22,7 @@ from warpspace.app.evaluation.machine_edits import (
     with_word,
 )
 from warpspace.app.panels import machine_editor
+from warpspace.app.panels.error_list import origin_words
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.edits import with_curve, with_scene_tolerances
 from warpspace.app.state.tree import put
@@ -171,6 +172,18 @@ def test_what_stands_somewhere_stays_within_the_ranges_of_another_machine(state)
     assert opened.rotary == changed.rotary
     assert LIVE.evaluate(changed).traces
     assert changed.with_scene(load_scene("machine_c_frame_mill")).rotary.held == {}
+
+
+def test_errors_measured_on_another_chain_are_assumptions_and_the_title_says_so():
+    text = scene_to_toml(load_scene("dvf5000_first")) + "[uncertainty]\nEA0Z = 2\n"
+    opened = start_state(parse_scene(text, "measured"))
+    changed = with_word(opened, "remove B")
+    assert changed.scene.title == f"{opened.scene.title}, chain wCFXYZt"
+    assert not changed.scene.uncertainty
+    assert f"errors of {opened.scene.title} are kept as assumptions" in " ".join(changed.notes)
+    assert "u =" in origin_words(opened, "EA0Z")[0]
+    assert origin_words(changed, "EA0Z")[0].endswith("for the chain wCBFXYZt")
+    assert with_word(changed, "own").scene is opened.scene
 
 
 def test_a_chain_that_is_refused_stays_in_its_box_with_the_reason(state):

@@ -15,6 +15,7 @@ from warpspace.app.drawing.labels import axes, point_labels
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
 from warpspace.app.panels.analysis_panel import AnalysisPanel
 from warpspace.app.panels.design import SAMPLES, TolerancesPanel
+from warpspace.app.panels.error_list import ErrorsPanel
 from warpspace.app.panels.file_dialogs import ReportDialog
 from warpspace.app.panels.overlay import (
     ComparePanel,
@@ -170,6 +171,20 @@ def test_controls_set_what_is_coloured_and_how_the_machine_is_drawn():
     html = pieces(ControlsPanel, START)["controls"]
     assert 'id="ws-SetLeaf-look-isolines"' in html
     assert "look.surface&quot;,&quot;value&quot;:&quot;slices&quot;" in html
+
+
+def test_rows_are_those_of_the_present_errors_whatever_is_drawn():
+    rows = pieces(ErrorsPanel, START)
+    for other in ("fork_head_bc", "teach_pitching_axis"):  # one with another chain
+        compared = with_sides(START, scene_side(load_scene(other)), Side())
+        compared = put(compared, "comparison.shown", "a")
+        shown = pieces(ErrorsPanel, compared)
+        assert f"For the present errors; the drawing shows A: {compared.comparison.a.title}." in (
+            shown.pop("errors")
+        )
+        assert shown == {name: row for name, row in rows.items() if name != "errors"}
+    present = put(compared, "comparison.shown", "b")
+    assert "the drawing shows" not in pieces(ErrorsPanel, present)["errors"]
 
 
 def test_comparing_is_shown_and_left_by_one_switch():

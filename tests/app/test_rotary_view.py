@@ -139,7 +139,7 @@ def test_a_change_of_a_rotary_error_offers_the_drawing():
 def test_the_effect_of_a_rotary_error_is_that_over_the_range_of_its_axis():
     """An error that turns with the table is as large at each of its positions."""
     picture = LIVE.evaluate(START)
-    gains = _gains(picture, START)
+    gains = _gains(picture)
     assert gains["EXC"] == pytest.approx(1.0, rel=1e-6)
     one = LIVE.evaluate(ROTARY.with_amplitude("EB0C", 1.0))
     volume = LIVE.evaluate(START.zeroed().with_amplitude("EB0C", 1.0))

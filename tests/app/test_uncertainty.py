@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from viser.transforms import SO3
 
+from app.parts import lone_part
 from warpspace.app.documents import legend
 from warpspace.app.documents.legend import faded_words, numbers_words
 from warpspace.app.drawing.around import draw_surroundings
@@ -14,6 +15,7 @@ from warpspace.app.drawing.box import box
 from warpspace.app.drawing.labels import point_labels
 from warpspace.app.drawing.shapes import SCENE_PER_MM, ellipsoid
 from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.panels.overlay import OrderPanel
 from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.tree import put
 from warpspace.picture.map_mesh import map_mesh
@@ -98,6 +100,10 @@ def test_what_is_not_stated_is_unknown_and_what_a_scene_says_nothing_of_is_not_s
     moved = state_of(look__quantity="uncertainty", look__significant="1", look__ellipsoids="1")
     unknown = LIVE.evaluate(moved.with_amplitude("EYY", 1.0))
     assert "max 13.5 ± ? µm" in numbers_words(unknown)
+    below = lone_part(OrderPanel).render(unknown)["head.order"]
+    assert "uncertainty of EYY is unknown" in below
+    assert "State it in [uncertainty] of the scene" in below
+    assert legend.unknown_words(LIVE.evaluate(moved)) == ""
     assert (unknown.quantity, unknown.faded) == ("position", None)
     assert "/uncertainty/ellipsoid0" not in draw_surroundings(unknown)
     silent = LIVE.evaluate(state_of(SCENE.partition("[uncertainty")[0], look__significant="1"))

@@ -10,7 +10,7 @@ import numpy as np
 from warpspace.analysis.description import ExpandedUncertainty
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField
-from warpspace.field.grid import Grid, build_grid
+from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import PARAMETERS, parameter
 from warpspace.machine.errors import ErrorSet, ToleranceSet
@@ -140,7 +140,7 @@ def _weighted_p95(values: Array, shares: Array) -> float:
 
 # Measured machines: errors against tolerances, and the predicted volumetric error.
 
-PREDICTED_NODES = 11  # per axis
+THESIS_NODES = 11  # per axis; each node counts once
 SHEARS = {"XY": (0, 1, -1.0), "XZ": (0, 2, 1.0), "YZ": (1, 2, -1.0)}
 
 
@@ -171,7 +171,7 @@ class Measured:
 
     checks: tuple[Check, ...]  # one per error of the set
     predicted: Statistics  # |E| of the loop over the working volume
-    # the same over the nodes of the grid, each with the same weight
+    # the same over 11³ nodes, each with the same weight, as in the thesis
     predicted_nodes: Statistics
     # angle by which the volume is out of square per plane, in the sign of the squareness parameter;
     # out of a least-squares affine fit to the whole map
@@ -192,7 +192,7 @@ def measured(
     *,
     tolerances: ToleranceSet | None = None,
     loop: Loop | str | None = None,
-    grid: int | Sequence[int] = PREDICTED_NODES,
+    grid: int | Sequence[int] = DEFAULT_NODES,
 ) -> Measured:
     """Check the errors of a scene against tolerances and predict its volumetric error.
 
@@ -209,12 +209,15 @@ def measured(
     -------
     Measured
     """
-    nodes = build_grid(scene.model, scene.workspace, grid)
-    field = evaluate_grid(scene, nodes, choose_view(scene, loop))
+    nodes, of_thesis = (
+        build_grid(scene.model, scene.workspace, count) for count in (grid, THESIS_NODES)
+    )
+    view = choose_view(scene, loop)
+    field = evaluate_grid(scene, nodes, view)
     return Measured(
         check_errors(scene.errors, scene.tolerances if tolerances is None else tolerances),
         volume_statistics(field, nodes),
-        statistics(field, nodes.coordinates),
+        statistics(evaluate_grid(scene, of_thesis, view), of_thesis.coordinates),
         shear(field),
     )
 

@@ -61,7 +61,8 @@ def cut_all(values: T, piece: Piece) -> T:
     return values
 
 
-DEFAULT_NODES = 21
+DEFAULT_NODES = 21  # per axis, of every map and statistic of a volume unless stated otherwise
+RESIDUAL_NODES = 28  # per axis, for residual errors: between the points of usual tables
 MIN_NODES, MAX_NODES = GRID_NODES
 DIMENSIONS = 3
 VolumeAxes = tuple[str, str, str]

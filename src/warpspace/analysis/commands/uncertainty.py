@@ -18,7 +18,7 @@ from warpspace.analysis.uncertainty.propagation import (
     plus_minus,
     volume_uncertainty,
 )
-from warpspace.field.grid import build_grid
+from warpspace.field.grid import DEFAULT_NODES, build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import Covariance
@@ -50,7 +50,9 @@ class Uncertainty(Analysis):
     )  # fmt: skip
     verify: bool = option(False, "Monte Carlo beside the linear propagation")
     loop: Loop | None = option(None, LOOP_HELP, unset=LOOP_UNSET)
-    nodes: int = option(11, "Nodes per axis of the working volume", low=2, high=21, flag="--grid")
+    nodes: int = option(
+        DEFAULT_NODES, "Nodes per axis of the working volume", low=2, high=21, flag="--grid"
+    )
     samples: int = option(10_000, "Number of machines drawn", low=100, high=1_000_000)
     seed: int = option(0, "Seed of the random numbers", low=0, high=2**63 - 1)
 

@@ -309,6 +309,15 @@ def faded_words(picture: LivePicture) -> tuple[str, ...]:
     return (f"grey: {what}, {number(percent, 0)} % of the volume",)
 
 
+def unknown_words(picture: LivePicture) -> str:
+    """Explain “± ?” in the heading: the errors without a stated uncertainty, and what to do."""
+    uncertainty = picture.uncertainty
+    if uncertainty is None or uncertainty.errors.is_known or picture.is_rotary:
+        return ""
+    remarks = "; ".join(uncertainty.errors.remarks())
+    return f"{remarks}. State it in [uncertainty] of the scene, or calibrate these errors."
+
+
 def range_conditions(picture: LivePicture) -> tuple[str, ...]:
     scale = picture.scale
     fixed = picture.state.look.range_mode == "fixed"

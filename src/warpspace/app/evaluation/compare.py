@@ -11,6 +11,7 @@ from dataclasses import replace
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.state.app_state import PRESENT, AppState, Comparison, Side, start_state
 from warpspace.app.state.look import RotaryLook
+from warpspace.field.grid import DEFAULT_NODES, RESIDUAL_NODES
 from warpspace.geometry.colour import ColourScale
 from warpspace.picture.model import choose_scale, same_nodes, subtract_pictures, subtract_traces
 from warpspace.scene.model import Scene
@@ -20,7 +21,7 @@ BEFORE, AFTER = "before", "after"
 DIGITS = 3  # decimals of a proposed error, µm or µrad
 LOOKED_AT = (
     "component", "nodes", "exaggeration", "look", "machine", "shown", "part", "forms", "picked",
-    "lever",
+    "lever", "specification",
 )  # fmt: skip
 """Fields of the present state that apply to both sides."""
 REFUSED = "The working volumes differ, so no difference can be computed node by node."
@@ -41,6 +42,8 @@ def side_state(now: AppState, side: Side) -> AppState:
         comparison=Comparison(),
         **{name: getattr(now, name) for name in LOOKED_AT},
     )
+    if drawn_tables(now) and now.nodes == DEFAULT_NODES:  # both sides, for their difference
+        viewed = replace(viewed, nodes=RESIDUAL_NODES)
     return viewed.within_reach()
 
 
@@ -192,6 +195,13 @@ def without_words(state: AppState) -> str:
     """Return the remark that numbers are for the machine without table; empty without one."""
     names = " and ".join(drawn_tables(state))
     return WITHOUT.format(names) if names else ""
+
+
+def present_words(picture: LivePicture) -> str:
+    """Return the remark that numbers are not those of what is drawn; empty where they are."""
+    if picture.other_title:
+        return f"For the present errors; the drawing shows {picture.other_title}."
+    return without_words(picture.state)
 
 
 def without_table(state: AppState) -> AppState:

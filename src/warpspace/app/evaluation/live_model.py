@@ -129,7 +129,7 @@ class LiveModel:
         scene, workspace = state.scene, state.scene.workspace.moved(state.positions)
 
         def build(axis: str, at: float) -> Response:
-            plane = build_slice(scene.model, workspace, axis, at, state.nodes)
+            plane = build_slice(scene.model, workspace, axis, at, state.grid_nodes)
             return ((plane, grid_basis(scene, plane, state.view())),)
 
         if state.look.surface == "slices":
@@ -166,7 +166,7 @@ class LiveModel:
 
 
 def _place(state: AppState) -> tuple[object, ...]:
-    return Identity(state.scene), state.nodes, tuple(state.positions.items()), state.view_key
+    return Identity(state.scene), state.grid_nodes, tuple(state.positions.items()), state.view_key
 
 
 def _size(response: Response) -> int:
@@ -175,7 +175,7 @@ def _size(response: Response) -> int:
 
 def _build(state: AppState) -> Response:
     scene = state.scene
-    grid = build_grid(scene.model, scene.workspace.moved(state.positions), state.nodes)
+    grid = build_grid(scene.model, scene.workspace.moved(state.positions), state.grid_nodes)
     positions = {**scene.workspace.positions, **state.positions}
     points = state.rotary.points_mm(scene)
     groups = build_traces(scene.model, points, positions, TRACE_SAMPLES, state.rotary.held)

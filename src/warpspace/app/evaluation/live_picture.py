@@ -143,6 +143,16 @@ class LivePicture(Picture):
     def title(self) -> str:
         return self.state.scene.title if self.compared is None else self.compared.title
 
+    @property
+    def other_title(self) -> str:
+        """Title of what is drawn instead of the present state; empty where that is drawn."""
+        compared, chosen = self.compared, self.state.comparison
+        if compared is None:
+            return ""
+        side = chosen.a if compared.view == "a" else chosen.b
+        is_present = not self.is_difference and (side is None or side.state is None)
+        return "" if is_present else compared.title
+
     def describe_sides(self, word: Callable[[AppState], str]) -> str:
         """Describe the drawn state; for a difference both sides where they differ."""
         if self.compared is None or not self.is_difference:

@@ -281,7 +281,13 @@ def with_word(state: AppState, word: str) -> AppState:
 
 
 def with_changed_scene(state: AppState, scene: Scene) -> AppState:
-    before, keys = state.scene, scene.parameter_keys
+    before, original = state.scene, state.origin
+    notes: list[str] = []
+    if scene.machine.chain != before.machine.chain:
+        scene = _with_origin(scene, original)
+        if scene.errors and scene.title != original.title:
+            notes.append(NOT_MEASURED.format(original.title, scene.machine.chain))
+    keys = scene.parameter_keys
     was, stands = before.workspace.positions, scene.workspace.positions
     # an axis whose position in the working volume was edited moves there
     unmoved = {
@@ -307,7 +313,31 @@ def with_changed_scene(state: AppState, scene: Scene) -> AppState:
     )
     curves = changed.own_curves
     start = {key: curves[key].amplitude if key in curves else 0.0 for key in keys}
-    return replace(changed.within_reach(), start=start)
+    return replace(changed.within_reach(), start=start).noted(*notes)
+
+
+NOT_MEASURED = (
+    "the errors of {} are kept as assumptions for the chain {}: readings and uncertainties were"
+    " dropped, the title was changed"
+)
+
+
+def _with_origin(scene: Scene, original: Scene) -> Scene:
+    """Return an edited scene with title and measurements of the original one, for its chain only.
+
+    With another chain the title states it, and the errors are assumptions.
+    """
+    chain = scene.machine.chain
+    if chain != original.machine.chain:
+        title = f"{original.title or original.name}, chain {chain}"
+        return replace(scene, title=title, uncertainty={}, covariance=None, measured={})
+    scene = replace(scene, title=original.title)
+    if scene.errors != original.errors:
+        return scene
+    return replace(
+        scene, uncertainty=original.uncertainty, covariance=original.covariance,
+        measured=original.measured,
+    )  # fmt: skip
 
 
 def _amplitude(state: AppState, scene: Scene, key: str) -> float:

@@ -161,9 +161,12 @@ def plan_test(test: BenchTest, scene: Scene) -> BenchPlan:
 
 
 def bench_overlay(state: AppState) -> SceneOverlay[type[BenchTest]] | None:
-    """Build the path of the selected test; None where none is drawn, or it cannot be run."""
+    """Build the path of the selected test; None where none is drawn, or it cannot be run.
+
+    A test is of the uncompensated machine, so that no path is drawn in a compensated box.
+    """
     kind, option_texts = chosen_test(state), option_values(state, TEST)
-    if kind is None or option_texts.get("path") == "0":
+    if kind is None or option_texts.get("path") == "0" or state.controller is not None:
         return None
 
     def lay(scene: Scene) -> SceneOverlay[type[BenchTest]]:
@@ -177,5 +180,4 @@ def bench_overlay(state: AppState) -> SceneOverlay[type[BenchTest]] | None:
             kind, still, pieces, at, point, inside, still, nominal, response, nominal
         )
 
-    without = replace(state, controller=None)  # a test is of the uncompensated machine
-    return _cached_overlay(without, (kind, *sorted(option_texts.items())), lay)
+    return _cached_overlay(state, (kind, *sorted(option_texts.items())), lay)

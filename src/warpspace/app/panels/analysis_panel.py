@@ -43,6 +43,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import LONGEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
 from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.field.grid import DEFAULT_NODES
 from warpspace.machine.axes import parameter
 from warpspace.picture.formatting import spell_at
 from warpspace.scene.model import Scene
@@ -117,6 +118,9 @@ class AnalysisPanel(Section):
         state_values["placed"] = str(int(state.view_key[1]))
         if state.picked is not None:
             state_values["at"] = spell_at(state.picked.at)
+        for option in self.options():  # statistics are those of the drawn grid
+            if option.name in ("grid", "nodes") and option.default == DEFAULT_NODES:
+                state_values[option.name] = str(min(state.nodes, int(option.high or state.nodes)))
         return {o.name: state_values[o.name] for o in self.options() if o.name in state_values}
 
     def scenes(self, state: AppState) -> Sequence[Scene]:
@@ -173,10 +177,12 @@ class AnalysisPanel(Section):
         return {**defaults, **chosen, **{k: defaults[k] for k in OF_STATE & defaults.keys()}}
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
-        return (self.result_key(picture.state),)
+        return (self.result_key(picture.state), compare.present_words(picture))
 
     def body(self, picture: LivePicture) -> Markup:
-        return self._body(picture.state)
+        words = compare.present_words(picture)
+        remark = tag("p", words, class_="ws-tiny") if words else EMPTY
+        return remark + self._body(picture.state)
 
     def _body(self, state: AppState) -> Markup:
         key, is_automatic = self.result_key(state), self.is_automatic(state)
@@ -216,6 +222,8 @@ class AnalysisPanel(Section):
         outcome, cards = self.outcome, list[Markup]()
         if outcome is None:
             return EMPTY
+        if key == self._applied_key != outcome.key:
+            return EMPTY  # applied, not offered again
         hints = {do.Preview: "Compare the result with the current state",
                  do.Apply: "Change the errors; the current state becomes A"}  # fmt: skip
         for index in self.offered_changes(outcome.result):

@@ -15,8 +15,10 @@ from warpspace.analysis.blocks import Band, Curve, Lines
 from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, fill, join, tag
+from warpspace.app.evaluation.compare import plain_state, present_words, without_table
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import lines_html
+from warpspace.app.panels.file_dialogs import PLAIN
 from warpspace.app.panels.panel import Context, Panel, Refresh, actions, on, quiet, tiny
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
@@ -181,7 +183,9 @@ def edit_curve(state: AppState, action: do.EditCurve) -> tuple[AppState, CurveEd
 
 def origin_words(state: AppState, key: str) -> tuple[str, bool]:
     """Describe the origin of an error; return also if it differs from the scene as opened."""
-    scene, scene_curve = state.origin, state.own_curves.get(key)
+    scene, scene_curve, chain = state.origin, state.own_curves.get(key), state.scene.machine.chain
+    if chain != scene.machine.chain:  # measured on another machine
+        scene = replace(scene, uncertainty={}, measured={})
     uncertainty, measurement = scene.uncertainty.get(key), scene.measured.get(key)
     if scene_curve is None:
         text = "zero, not specified in the scene"
@@ -192,6 +196,8 @@ def origin_words(state: AppState, key: str) -> tuple[str, bool]:
         text = f"fitted to measurements, file {scene.name}"
     else:
         text = "assumed: specified without readings"
+    if chain != state.origin.machine.chain:
+        text += f", for the chain {state.origin.machine.chain}"
     if uncertainty is not None:
         text += f"; u = {spell(abs(uncertainty.amplitude))} {parameter(key).unit} (k = 1)"
     curve, scene_curve = state.curve(key), scene_curve or Constant(state.axis_span(key))
@@ -309,11 +315,11 @@ class ErrorsPanel(Panel):
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         state = picture.state
         inputs = (Identity(state.scene), state.view_key, tuple(state.positions.items()))
-        gains = self._gains.get(inputs, lambda: _gains(picture, state))
+        gains = self._gains.get(inputs, lambda: _gains(picture))
         ranking = self._rank(state, gains)
         listed = (ranking.order, ranking.used, bool(state.changed_keys))
-        inputs = (*listed, state.page, state.exclusions)
-        errors = self._list.get(inputs, lambda: _list_html(state, ranking))
+        inputs = (*listed, state.page, state.exclusions, picture.other_title)
+        errors = self._list.get(inputs, lambda: _list_html(picture, ranking))
         return {"errors": errors, **self._render_rows(state, ranking, gains)}
 
     def _rank(self, state: AppState, gains: Mapping[str, float]) -> Ranking:
@@ -395,8 +401,9 @@ class ErrorsPanel(Panel):
         return replace(state, page=replace(state.page, row=row))
 
 
-def _list_html(state: AppState, ranking: Ranking) -> str:
-    query, used = state.page.query, ranking.used
+def _list_html(picture: LivePicture, ranking: Ranking) -> str:
+    state, used = picture.state, ranking.used
+    query = state.page.query
     matches = find_parameters(query, ranking.order) if query.strip() else used
     listed = [key for key in ranking.order if key in matches]
     zero = [] if query.strip() else [key for key in ranking.order if key not in matches]
@@ -431,7 +438,8 @@ def _list_html(state: AppState, ranking: Ranking) -> str:
         menu = tag("details", summary + tag("div", buttons), class_="ws-menu")
     head = tag("div", find + menu, class_="ws-find")
     body = tag("div", places, class_="ws-errors", data_leave=do.Signal.SORT_ERRORS)
-    return head + quiet(join(excluded)) + body
+    remark = tiny(present_words(picture)) if picture.other_title else EMPTY
+    return head + remark + quiet(join(excluded)) + body
 
 
 def _places(keys: list[str], row: str) -> Markup:
@@ -485,11 +493,14 @@ def _spans(state: AppState) -> dict[str, Span]:
     return {key: widest[parameter(key).kind] for key in state.amplitudes}
 
 
-def _gains(picture: LivePicture, state: AppState) -> dict[str, float]:
-    """Compute the RMS effect of a unit of each error, µm.
+def _gains(picture: LivePicture) -> dict[str, float]:
+    """Compute the RMS effect of a unit of each error of the present state, µm.
 
     Over the volume; of an error of a rotary axis over its traces where that is more.
     """
+    if picture.compared is not None:  # another state may be drawn
+        picture = PLAIN.evaluate(without_table(plain_state(picture.state)))
+    state = picture.state
     basis = grid_basis(state.scene, picture.grid, picture.view)
     squares = np.sum(basis.position**2, axis=-1).reshape(len(basis.keys), -1)
     rms = np.sqrt(squares @ picture.grid.weights.reshape(-1))

@@ -14,7 +14,6 @@ from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, join, number, rows, signed, tag
 from warpspace.app.drawing.camera import fit_camera
 from warpspace.app.evaluation import point_explanation
-from warpspace.app.evaluation.compare import without_words
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import (
     POINTS,
@@ -222,7 +221,7 @@ class DistancePanel(AnalysisPanel):
             buttons.append(button("Pin", do.Input.PIN_NOTE("\n".join(drawn[0].lines())),
                                   hint="Pin a note with these numbers"))  # fmt: skip
         status = tag("p", POINTS[point], role="status") if point else EMPTY
-        return actions(*buttons) + status + tiny(without_words(state))
+        return actions(*buttons) + status
 
     @on(do.Signal.PICK_POINTS)
     def pick(self, state: AppState) -> AppState:

@@ -28,7 +28,6 @@ from warpspace.formats.compensation.compensate import Compensation
 from warpspace.formats.compensation.controller import Controller
 from warpspace.formats.registry import find_format, formats
 from warpspace.machine.axes import is_linear
-from warpspace.machine.limits import REPAIR_NODES
 from warpspace.scene.model import Scene
 
 
@@ -96,9 +95,7 @@ class BestPanel(AdjustPanel):
         return state.page.task == "understand" and "worst" in state.page.open
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
-        low, high = REPAIR_NODES
-        nodes = str(min(max(state.nodes, low), high))
-        return {**super().defaults(state), "count": "1", "grid": nodes}
+        return {**super().defaults(state), "count": "1"}
 
     def dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (*self.body_dependencies(picture), _is_of_errors(picture))
@@ -243,7 +240,10 @@ class CompensatePanel(AnalysisPanel):
         return with_box(state, action.box, result.controller)
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
-        return (*super().body_dependencies(picture), box_of(picture.state))
+        return (self.result_key(picture.state), box_of(picture.state))
+
+    def body(self, picture: LivePicture) -> Markup:
+        return self._body(picture.state)  # with and without its table
 
     def _draw(self, result: Compensation, *, dark: bool, saves: bool) -> None:
         draw = self.context.services.draw_compensation

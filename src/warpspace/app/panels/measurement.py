@@ -19,6 +19,7 @@ from warpspace.app.browser.page import error_words
 from warpspace.app.documents.transfers import read_upload
 from warpspace.app.drawing.around import residuals
 from warpspace.app.drawing.shapes import Nodes, Shapes
+from warpspace.app.evaluation.compare import without_words
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import chosen_test, plan_test
 from warpspace.app.panels.analysis_panel import AnalysisPanel, ResultKey
@@ -124,6 +125,9 @@ class FilesPanel(AnalysisPanel):
 # --- Standard tests -------------------------------------------------------------------------------
 
 
+NOT_DRAWN = "Its path is not drawn in the compensated box."
+
+
 class TestsPanel(FilesPanel):
     """A standard test simulated on the model, with its path in the drawing."""
 
@@ -146,7 +150,8 @@ class TestsPanel(FilesPanel):
         return chosen_test(state) is not None
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
-        return (self.result_key(picture.drawn_state), picture.is_difference)
+        state = picture.drawn_state
+        return (self.result_key(state), picture.is_difference, without_words(state))
 
     def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
         analysis: Any = super().build_analysis(state, values, scene)
@@ -167,6 +172,8 @@ class TestsPanel(FilesPanel):
         if kind is None:
             return chooser
         test = self._body(state)
+        if state.controller is not None:
+            test = tiny(f"{without_words(state)} {NOT_DRAWN}") + test
         if picture.is_difference:
             test = alert("Not available for the difference of two machines: show A or B.")
         columns = ",".join(column.name for column in kind.columns)

@@ -100,6 +100,7 @@ class OrderPanel(Panel):
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         conditions, scene = [*legend.order_conditions(picture)], picture.state.left_behind
+        conditions += filter(None, [legend.unknown_words(picture)])
         if scene:
             conditions.append(f"with the errors of this machine; those of “{scene}” are not used")
         of_volume = not picture.is_difference and not picture.is_rotary

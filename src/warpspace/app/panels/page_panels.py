@@ -60,7 +60,7 @@ class TopPanel(Panel):
             for label, sign, description, keys in steps if description
         )  # fmt: skip
         hint = "Open a scene, measured errors, or a compensation table (Ctrl+O)"
-        state, title = picture.state, picture.state.origin.title or picture.state.origin.name
+        state, title = picture.state, picture.state.scene.title or picture.state.scene.name
         count = sum(note.status == "open" for note in state.review)
         notes = [
             button(f"Notes ({count})" if count else "Notes", do.Signal.OPEN_NOTES, kind="quiet",

@@ -24,7 +24,7 @@ from warpspace.app.state.look import (
 )
 from warpspace.exceptions import WarpspaceError
 from warpspace.field.evaluate import View
-from warpspace.field.grid import DEFAULT_NODES
+from warpspace.field.grid import DEFAULT_NODES, RESIDUAL_NODES
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear, parameter
 from warpspace.machine.definition import Vector
@@ -368,6 +368,12 @@ class AppState:
     @property
     def changed_keys(self) -> tuple[str, ...]:
         return tuple(key for key, value in self.amplitudes.items() if value != self.start[key])
+
+    @property
+    def grid_nodes(self) -> int:
+        """Nodes per axis of the drawn grid: unless set, those of residual errors with a table."""
+        is_residual = self.controller is not None and self.nodes == START_NODES
+        return RESIDUAL_NODES if is_residual else self.nodes
 
     @property
     def view_key(self) -> tuple[Loop, bool]:

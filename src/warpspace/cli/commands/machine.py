@@ -104,7 +104,7 @@ def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
     " of SCENE itself (own), and report the predicted map. Allows several SCENES.",
 )
 @shared_options.loop_option
-@shared_options.grid_option(11, "of the predicted map, with --against")
+@shared_options.grid_option(of="of the predicted map, with --against")
 @shared_options.json_option
 def check(
     scenes: tuple[str, ...], against: str | None, loop: str | None, grid: int, *, as_json: bool
@@ -260,7 +260,7 @@ def _against(scene: "Scene", result: "Measured") -> Iterator[Block]:
     yield (
         f"  predicted |E|: mean {result.predicted.mean_um:.2f}, RMS {result.predicted.rms_um:.2f},"
         f" max {result.predicted.max_um:.2f} µm over the volume;"
-        f" mean of the nodes {result.predicted_nodes.mean_um:.2f} µm{measured}"
+        f" mean of 11³ nodes {result.predicted_nodes.mean_um:.2f} µm{measured}"
     )
     shears = ", ".join(f"{plane} {value:+.1f}" for plane, value in result.shear_urad.items())
     yield f"  shear of the volume: {shears} µrad"

@@ -13,7 +13,7 @@ from warpspace.analysis.statistics import Statistics
 from warpspace.analysis.uncertainty.propagation import u95_lines
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import find_placement, fit_placement
-from warpspace.field.grid import build_grid
+from warpspace.field.grid import RESIDUAL_NODES, build_grid
 from warpspace.formats.compensation.controller import (
     BeforeAfter,
     Controller,
@@ -33,7 +33,6 @@ from warpspace.scene.model import Scene, with_direction, with_placement
 from warpspace.scene.text_files import parse_whole
 from warpspace.units import Array
 
-NODES = 28  # per axis, for the residual error: they lie between the points of usual tables
 SMALL_NODES = 7  # nodes and points per axis with which the placement of a workpiece is fitted
 STEP = 1000.0  # µm and µrad; change of a placement that measures the response of a table
 ROUNDING = 5e-3  # error of the response of a table, whose numbers are rounded
@@ -303,7 +302,7 @@ def table_points(kind: Format, scene: Scene, points: Points | None) -> dict[str,
 def compensate(
     scene: Scene,
     options: Compensate,
-    nodes: int = NODES,
+    nodes: int = RESIDUAL_NODES,
     *,
     check_cancelled: Callable[[], None] = lambda: None,
 ) -> Compensation:
@@ -351,8 +350,9 @@ def compensate(
         reversal = reversal_notes(directions, scene.errors, scene.model.direction)
         check_cancelled()
     return Compensation(
-        comparison.before, comparison.after, grid, comparison.field_uncertainty, kind, files,
-        points, controller, directions, reversal, options.resolution, unplaced,
+        comparison.before, comparison.after, grid, comparison.field_uncertainty,
+        comparison.before_statistics, kind, files, points, controller, directions, reversal,
+        options.resolution, unplaced,
     )  # fmt: skip
 
 

@@ -195,21 +195,11 @@ class BeforeAfter:
     after: ErrorField
     grid: Grid
     field_uncertainty: FieldUncertainty | None  # of the errors before; those after have the same
-
-    @property
-    def before_statistics(self) -> Statistics:
-        return self._statistics(self.before)
+    before_statistics: Statistics  # over the nodes of error maps, as everywhere else
 
     @property
     def after_statistics(self) -> Statistics:
-        return self._statistics(self.after)
-
-    def _statistics(self, field: ErrorField) -> Statistics:
-        statistics = volume_statistics(field, self.grid)
-        if self.field_uncertainty is None:
-            return statistics
-        uncertainty = replace(self.field_uncertainty, error_um=field.error_um)
-        return uncertainty.with_expanded_uncertainty(statistics)
+        return _statistics(self.grid, self.after, self.field_uncertainty)
 
     def as_statistics(self) -> dict[str, Any]:
         return {"before": to_json(self.before_statistics), "after": to_json(self.after_statistics)}
@@ -220,13 +210,26 @@ class BeforeAfter:
         return statistics.mean_um, statistics.max_um
 
 
+def _statistics(grid: Grid, field: ErrorField, uncertainty: FieldUncertainty | None) -> Statistics:
+    statistics = volume_statistics(field, grid)
+    if uncertainty is None:
+        return statistics
+    return replace(uncertainty, error_um=field.error_um).with_expanded_uncertainty(statistics)
+
+
 def evaluate_before_after(controller: Controller, grid: Grid, direction: str) -> BeforeAfter:
-    at, nominal, scene = grid.coordinates, grid.nominal_mm, controller.scene
-    scene = with_direction(scene, direction)
-    before = replace(controller, tables=Tables(())).field(at, nominal, scene)
-    view = scene.view(controller.loop)
-    uncertainty = field_uncertainty(scene, before.error_um, at, view, grid.point_mm, grid.weights)
-    return BeforeAfter(before, controller.field(at, nominal, scene), grid, uncertainty)
+    scene = with_direction(controller.scene, direction)
+    view, uncompensated = scene.view(controller.loop), replace(controller, tables=Tables(()))
+    after = controller.field(grid.coordinates, grid.nominal_mm, scene)
+
+    def before(nodes: Grid) -> tuple[ErrorField, FieldUncertainty | None]:
+        at, point, weights = nodes.coordinates, nodes.point_mm, nodes.weights
+        field = uncompensated.field(at, nodes.nominal_mm, scene)
+        return field, field_uncertainty(scene, field.error_um, at, view, point, weights)
+
+    mapped = build_grid(scene.model, scene.workspace)
+    field, uncertainty = before(grid)
+    return BeforeAfter(field, after, grid, uncertainty, _statistics(mapped, *before(mapped)))
 
 
 def reversal_notes(

@@ -63,7 +63,7 @@ def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
 
 def draw_ballbar(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     scene = scenes[0]
-    test = run_test(scene, Circular(plane="XY", radius_mm=150.0))
+    test = run_test(scene, Circular())
     title = f"Circular test: {scene.title}"
     return _draw("ballbar", title, scene, settings, bench_chart, test, title)
 
