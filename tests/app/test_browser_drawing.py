@@ -10,6 +10,7 @@ from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.machine_bodies import drawn_bodies, tool_point
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
+from warpspace.bodies.placed import place_points, shade_machine
 from warpspace.picture.map_mesh import isoline_pieces
 
 LIVE = LiveModel()
@@ -46,7 +47,11 @@ def test_surfaces_slices_isolines_and_marks(tab):
 
 def test_the_machine_moves_bends_and_carries_the_tool_point(tab):
     def stands(state):
-        wanted = {p.body.name: p.vertices_mm for p in drawn_bodies(LIVE.evaluate(state))}
+        surfaces = shade_machine(state.scene.machine)
+        wanted = {
+            p.body.name: place_points(p.motion, surfaces[p.body.name].vertices_mm, p.exaggeration)
+            for p in drawn_bodies(LIVE.evaluate(state))
+        }
         return all(same_points(tab.drawn(f"/machine/{name}"), wanted[name]) for name in wanted)
 
     tab.send(do.ShowMachine("solid"))
@@ -66,9 +71,9 @@ def test_the_machine_moves_bends_and_carries_the_tool_point(tab):
     assert not stands(state)
     tab.send(do.ShowMachine("ghost"))
     tab.until(lambda: tab.drawn("/machine/R_bed") is None)
-    tab.until(lambda: tab.drawn("/ghost_machine/R_bed") is not None)
+    tab.until(lambda: tab.drawn("/ghost_machine") is not None)
     tab.send(do.ShowMachine("off"))
-    tab.until(lambda: tab.drawn("/ghost_machine/R_bed") is None)
+    tab.until(lambda: tab.drawn("/ghost_machine") is None)
 
 
 def test_the_table_turns_until_the_page_is_left(open_tab):

@@ -257,7 +257,7 @@ LIGHT, MIDDLE, DARK, METAL = (206, 210, 216), (178, 184, 192), (104, 112, 124), 
 CREASE_DEG = 30.0  # angle from flat above which an edge is drawn
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Body:
     """One body of a machine, in its frame."""
 

@@ -10,7 +10,8 @@ import numpy as np
 from warpspace.bodies.frame import generate_bodies
 from warpspace.bodies.mesh import Body
 from warpspace.bodies.mesh_files import machine_meshes
-from warpspace.bodies.schematic import BODY_FILE, read_bodies
+from warpspace.bodies.schematic import BODY_FILE, build_layout, read_bodies
+from warpspace.bodies.shading import Surface, shade_bodies
 from warpspace.field.evaluate import View, find_placement, placement_effect
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import BASE, BodyMotion, body_motions, branch_pose
@@ -28,6 +29,13 @@ def load_bodies(machine: Machine) -> tuple[Body, ...]:
     meshes = machine_meshes(machine)
     bodies = [body for body in schematic or generate_bodies(machine) if body.frame not in meshes]
     return tuple(body for body in (*bodies, *meshes.values()) if body.frame in frames)
+
+
+def shade_machine(machine: Machine) -> dict[str, Surface]:
+    """Shade the bodies of a machine at home; by name."""
+    bodies, poses = load_bodies(machine), build_layout(machine).poses
+    surfaces = shade_bodies(bodies, tuple(poses[body.frame].tobytes() for body in bodies))
+    return {body.name: surface for body, surface in zip(bodies, surfaces, strict=True)}
 
 
 def _error_values(
@@ -109,6 +117,11 @@ class PlacedBody:
         frame, _, what = self.body.name.partition("_")
         name = what if frame in ("R", "S", "t") else f"{frame} {what}"
         return name.replace("_", " ")
+
+    @property
+    def pose(self) -> bytes:
+        """Drawn map from its frame to R, [4, 4]: hashable."""
+        return self.motion.drawn(self.exaggeration).tobytes()
 
     @cached_property
     def vertices_mm(self) -> Array:
