@@ -268,6 +268,7 @@ class Body:
     triangles: NDArray[np.int32]  # [T, 3]; Counter-clockwise seen from outside
     edges_mm: Array  # [E, 2, 3]; ends of the edges worth drawing
     warnings: tuple[str, ...] = ()  # on its surface
+    lines_mm: Array | None = None  # [L, 2, 3]; those of the edges that are drawn on its surface
 
 
 def build_body(
@@ -283,6 +284,7 @@ def build_body(
         np.array(mesh.vertices, dtype=float),
         np.array(mesh.faces, dtype=np.int32),
         edges if lines_mm is None else np.concatenate([edges, lines_mm]),
+        lines_mm=lines_mm,
     )
 
 

@@ -31,13 +31,6 @@ def load_bodies(machine: Machine) -> tuple[Body, ...]:
     return tuple(body for body in (*bodies, *meshes.values()) if body.frame in frames)
 
 
-def shade_machine(machine: Machine) -> dict[str, Surface]:
-    """Shade the bodies of a machine at home; by name."""
-    bodies, poses = load_bodies(machine), build_layout(machine).poses
-    surfaces = shade_bodies(bodies, tuple(poses[body.frame].tobytes() for body in bodies))
-    return {body.name: surface for body, surface in zip(bodies, surfaces, strict=True)}
-
-
 def _error_values(
     errors: ErrorSet, amplitudes: Mapping[str, float], coordinates: Coordinates, direction: str
 ) -> dict[str, float]:
@@ -111,6 +104,7 @@ class PlacedBody:
     body: Body  # mesh in its frame
     motion: BodyMotion  # nominal place of that frame, and its small motion
     exaggeration: float  # display factor of the small motion
+    surface: Surface
 
     @property
     def label(self) -> str:
@@ -119,9 +113,9 @@ class PlacedBody:
         return name.replace("_", " ")
 
     @property
-    def pose(self) -> bytes:
-        """Drawn map from its frame to R, [4, 4]: hashable."""
-        return self.motion.drawn(self.exaggeration).tobytes()
+    def pose(self) -> Array:
+        """Drawn map from its frame to R, [4, 4]."""
+        return self.motion.drawn(self.exaggeration)
 
     @cached_property
     def vertices_mm(self) -> Array:
@@ -150,8 +144,10 @@ def place_bodies(
 ) -> tuple[PlacedBody, ...]:
     """Place the bodies of a scene, or of some of its frames, displaced by its errors or others."""
     motions = scene_motions(scene, view, amplitudes, positions)
+    bodies, at_home = load_bodies(scene.machine), build_layout(scene.machine).poses
+    surfaces = shade_bodies(bodies, tuple(at_home[body.frame].tobytes() for body in bodies))
     return tuple(
-        PlacedBody(body, motions[body.frame], exaggeration)
-        for body in load_bodies(scene.machine)
+        PlacedBody(body, motions[body.frame], exaggeration, surface)
+        for body, surface in zip(bodies, surfaces, strict=True)
         if only is None or body.frame in only
     )

@@ -11,7 +11,7 @@ from warpspace.bodies.mesh import CREASE_DEG, Body
 from warpspace.units import Array
 
 _MOST_TRIANGLES = 20_000  # of a body; a larger one is drawn as it is
-_BEVEL, _LARGEST_BEVEL = 0.08, 0.005
+_BEVEL, _LARGEST_BEVEL = 0.08, 0.003
 """Width of a bevel relative to the thinnest side of its shape, and to the machine."""
 _PER_MM = 32  # places are rounded: fewer bytes of a page once it is compressed
 _LONGEST_CORNER = 12  # edges that meet in a corner
@@ -66,8 +66,10 @@ def shade_bodies(bodies: tuple[Body, ...], poses: tuple[bytes, ...]) -> tuple[Su
         if surface.normals is not None:
             points, normals = surface.vertices_mm @ turn.T + shift, surface.normals @ turn.T
             # shapes of one body overlap, with faces in one plane that must look alike
-            others = np.array([box for box, of in zip(boxes, owners, strict=True) if of != number])
-            surface.colours[:] *= _brightness(points, normals, others, size)[:, None]
+            neighbours = np.array(
+                [box for box, of in zip(boxes, owners, strict=True) if of != number]
+            )
+            surface.colours[:] *= _brightness(points, normals, neighbours, size)[:, None]
     return tuple(surfaces)
 
 

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from warpspace.bodies.mesh import MIDDLE, build_body
-from warpspace.bodies.placed import load_bodies, shade_machine
+from warpspace.bodies.placed import load_bodies
 from warpspace.bodies.schematic import box, cylinder
 from warpspace.bodies.shading import shade_bodies
 from warpspace.scene.machine_library import load_machine, machine_names
@@ -27,9 +27,9 @@ def closed(surface):
 @pytest.mark.parametrize("name", machine_names())
 def test_bevelled_bodies_are_closed_lie_within_the_sharp_ones_and_keep_their_volume(name):
     machine = load_machine(name)
-    surfaces = shade_machine(machine)
-    for sharp in load_bodies(machine):
-        mesh = closed(surfaces[sharp.name])
+    bodies = load_bodies(machine)
+    for sharp, surface in zip(bodies, shade_bodies(bodies, (HERE,) * len(bodies)), strict=True):
+        mesh = closed(surface)
         volume = trimesh.Trimesh(sharp.vertices_mm, sharp.triangles, process=False).volume
         assert 0.93 < mesh.volume / volume < 1.001, sharp.name
         low, high = sharp.vertices_mm.min(axis=0), sharp.vertices_mm.max(axis=0)

@@ -131,6 +131,10 @@
         const place = at.position.array.slice(), shade = at.color.array.slice();
         hold(lines);
         this.show = share => {
+          for (const name of ["/limit/line", "/limit/hatching"]) {
+            const line = warpspaceViser.node(name);
+            if (line) line.visible = share === 1;
+          }
           if (current === turn) draw(mesh, place.map((x, i) => from[i] + share * (x - from[i])), shade);
         };
       }

@@ -13,7 +13,7 @@ from viser.transforms import SO3
 from warpspace.app.browser.page import Page
 from warpspace.app.drawing.around import GIZMO, draw_surroundings, program_point, turned_points
 from warpspace.app.drawing.colours import colour
-from warpspace.app.drawing.shapes import SCENE_PER_MM, UNLIT, Nodes, SceneNode, Shapes, ball
+from warpspace.app.drawing.shapes import SCENE_PER_MM, UNLIT, Nodes, SceneNode, Shapes, ball, lines
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import (
     drawn_bodies,
@@ -25,10 +25,12 @@ from warpspace.app.evaluation.machine_bodies import (
 from warpspace.app.evaluation.scene_overlays import moved_place
 from warpspace.app.state.leaf import Identity
 from warpspace.bodies.gltf import GltfNode, Material, build_gltf
-from warpspace.bodies.placed import PlacedBody, shade_machine
+from warpspace.bodies.placed import PlacedBody
 from warpspace.bodies.shading import Surface
 from warpspace.geometry.colour import srgb_to_linear
+from warpspace.geometry.surfaces import triangulate
 from warpspace.kinematics import transforms
+from warpspace.units import Array
 
 STEP_S = 0.125  # between two pictures of a rotating table; each is sent to the page
 LONGEST_STEP_S = 0.5  # longer delays are skipped
@@ -36,10 +38,11 @@ SPEEDS_DEG_S = (10.0, 30.0, 90.0)
 PROGRAM = "program"  # what plays, in place of the name of an axis
 PROGRAM_S = 20.0  # time of a whole program at the middle speed
 
+SLOT = (70, 78, 90)  # colour of the slots of tables
 BALL = 0.010  # marker of the tool point, relative to the longest edge
 SHADOW, SHADOW_REACH, SHADOW_INSET = 0.3, 0.16, 0.25
 """Shadow of a machine: opacity, width of its rim relative to the machine, share of it inside."""
-SHADOW_SIDES, SHADOW_RINGS = 24, 6
+SHADOW_STEPS = 6
 FOOT = 0.15  # share of the height of a machine that stands on the floor
 GIZMO_SIZE = 0.3  # relative to the longest edge
 
@@ -52,9 +55,12 @@ def machine(picture: LivePicture, turned: Mapping[str, float]) -> Shapes:
     """
     is_shown, shapes = picture.state.machine.shown, dict[str, SceneNode | None]()
     if is_shown or turned or picture.is_rotary:
-        surfaces, parts = shade_machine(picture.state.scene.machine), drawn_bodies(picture, turned)
+        parts = drawn_bodies(picture, turned)
         for part in parts:
-            shapes[f"/machine/{part.body.name}"] = _solid(surfaces[part.body.name], part.pose)
+            shapes[f"/machine/{part.body.name}"] = _solid(part.surface, part.pose.tobytes())
+            if part.body.lines_mm is not None:
+                slots = transforms.apply(part.pose, part.body.lines_mm)
+                shapes[f"/machine/{part.body.name}_lines"] = lines(slots, SLOT, 1.2)
         if is_shown and not picture.is_rotary:
             at, size = tool_point(picture)[0], BALL * picture.size_mm
             shapes["/machine/tool_point"] = ball(at, size, colour(picture, "edge"))
@@ -74,9 +80,8 @@ def has_ghost(picture: LivePicture) -> bool:
 
 def ghost_machine(picture: LivePicture) -> Shapes:
     """Draw the nominal machine as one node: `browser/mesh.js` shows it pale, behind everything."""
-    surfaces = shade_machine(picture.state.scene.machine)
     parts = drawn_bodies(picture, nominal=True)
-    nodes = [_surface_node(surfaces[p.body.name], p.pose, "ghost", opacity=0.0) for p in parts]
+    nodes = [_surface_node(part.surface, part.pose, "ghost", opacity=0.0) for part in parts]
     return {"/ghost_machine": _glb(_shadow(_footprint(parts)), *nodes)}
 
 
@@ -86,15 +91,14 @@ def _glb(*nodes: GltfNode) -> SceneNode:
 
 @lru_cache(maxsize=128)
 def _solid(surface: Surface, pose: bytes) -> SceneNode:
-    return _glb(_surface_node(surface, pose, "body"))
+    return _glb(_surface_node(surface, np.frombuffer(pose).reshape(4, 4), "body"))
 
 
-def _surface_node(surface: Surface, pose: bytes, name: str, opacity: float = 1.0) -> GltfNode:
-    matrix = np.frombuffer(pose).reshape(4, 4)
-    points = transforms.apply(matrix, surface.vertices_mm)
+def _surface_node(surface: Surface, pose: Array, name: str, opacity: float = 1.0) -> GltfNode:
+    points = transforms.apply(pose, surface.vertices_mm)
     attributes: dict[str, NDArray[Any]] = {}
     if surface.normals is not None:
-        normals = surface.normals @ matrix[:3, :3].T
+        normals = surface.normals @ pose[:3, :3].T
         normals *= 127.0 / np.abs(normals).max(axis=1, initial=1.0, keepdims=True)
         attributes["NORMAL"] = np.insert(np.rint(normals), 3, 0.0, axis=1).astype(np.int8)
     linear = np.insert(srgb_to_linear(surface.colours), 3, 1.0, axis=1)
@@ -119,23 +123,17 @@ def _shadow_alone(rectangle: tuple[float, ...]) -> SceneNode:
 def _shadow(rectangle: tuple[float, ...]) -> GltfNode:
     """Build the soft shadow of a machine on its floor: a rectangle with a round, fading rim."""
     low, high = np.reshape(rectangle, (2, 3))
-    turn = 2.0 * np.pi * (np.arange(SHADOW_SIDES) + 0.5) / SHADOW_SIDES
-    out = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-    corner = np.where(out > 0.0, high[:2], low[:2])
-    fade = np.linspace(0.0, 1.0, SHADOW_RINGS)
     reach = SHADOW_REACH * float((high - low)[:2].max())
-    rings = corner + reach * (fade[:, None, None] - SHADOW_INSET) * out
-    points = np.insert(rings.reshape(-1, 2), 2, low[2], axis=1)
-    opacity = np.repeat(SHADOW * (1.0 - fade) ** 2, SHADOW_SIDES)
-    colours = np.insert(np.zeros((len(points), 3)), 3, opacity, axis=1)
-    grid = np.arange(len(points)).reshape(SHADOW_RINGS, SHADOW_SIDES)
-    inner, outer = grid[:-1], grid[1:]
-    after, outer_after = np.roll(inner, -1, axis=1), np.roll(outer, -1, axis=1)
-    rim = [np.stack(corners, axis=-1).reshape(-1, 3)
-           for corners in ((inner, outer, after), (after, outer, outer_after))]  # fmt: skip
-    middle = np.stack([np.zeros(SHADOW_SIDES - 2, int), grid[0, 1:-1], grid[0, 2:]], axis=-1)
+    steps = reach * np.linspace(-SHADOW_INSET, 1.0, SHADOW_STEPS)
+    sides = [np.concatenate([low[k] - steps[::-1], high[k] + steps]) for k in (0, 1)]
+    points = np.stack(np.meshgrid(*sides, low[2]), axis=-1)[:, :, 0]  # [n, n, 3]
+    outside = np.maximum(low - points, points - high)[..., :2] / reach + SHADOW_INSET
+    distance = np.linalg.norm(np.maximum(outside, 0.0), axis=-1) / (1.0 + SHADOW_INSET)
+    opacity = SHADOW * np.maximum(1.0 - distance, 0.0) ** 2
+    colours = np.insert(np.zeros((opacity.size, 3)), 3, opacity.ravel(), axis=1)
+    triangles = triangulate([np.arange(opacity.size).reshape(opacity.shape)]).triangles
     material = Material("shadow", opacity=0.99)  # blended
-    return GltfNode("shadow", points, np.concatenate([middle, *rim]), material, colours)
+    return GltfNode("shadow", points.reshape(-1, 3), triangles, material, colours)
 
 
 class MovingLayer:
