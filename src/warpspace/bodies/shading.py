@@ -18,11 +18,14 @@ _LONGEST_CORNER = 12  # edges that meet in a corner
 _NEAR, _DARKENED = (0.02, 0.06), 0.55
 """Distances to neighbours that darken a surface, relative to the machine; by how much at most."""
 _HUES = {
-    "X": (206, 66, 58), "Y": (62, 150, 84), "Z": (58, 104, 190),
-    "A": (196, 92, 150), "B": (170, 146, 50), "C": (50, 150, 172),
-}  # fmt: skip
+    **dict.fromkeys("XU", (206, 66, 58)),
+    **dict.fromkeys("YV", (62, 150, 84)),
+    **dict.fromkeys("ZW", (58, 104, 190)),
+    "A": (196, 92, 150),
+    "B": (170, 146, 50),
+    "C": (50, 150, 172),
+}
 """Colours of the axes that move a body: X, Y and Z those of the triad."""
-_HUES |= {letter: _HUES[like] for letter, like in zip("UVW", "XYZ", strict=True)}
 _TINTED = 0.16  # share of the hue in the colour of a body
 
 
@@ -88,9 +91,7 @@ def _brightness(points: Array, normals: Array, boxes: Array, size: float) -> Arr
 
 def _bevel(
     body: Body, widest_mm: float
-) -> (
-    tuple[Array, Array, NDArray[np.integer], NDArray[np.integer], list[NDArray[np.integer]]] | None
-):
+) -> tuple[Array, Array, NDArray[np.integer], list[NDArray[np.integer]]] | None:
     """Bevel the sharp edges of the closed shapes of a body; None if that is not possible.
 
     Each smooth group of triangles shrinks from its sharp edges; quadrilaterals along these edges,
