@@ -1,5 +1,6 @@
 """Surfaces of bodies as they are drawn: bevelled, darker in corners, tinted by axis."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
@@ -56,12 +57,7 @@ def shade_bodies(bodies: tuple[Body, ...], poses: tuple[bytes, ...]) -> tuple[Su
         colour = np.array(body.colour) / 255.0
         if body.frame[0] in _HUES:
             colour += _TINTED * (np.array(_HUES[body.frame[0]]) / 255.0 - colour)
-        bevelled = _bevel(body, _LARGEST_BEVEL * size)
-        if bevelled is None:
-            colours = np.tile(colour, (len(points), 1))
-            surfaces.append(Surface(body.vertices_mm, None, body.triangles, colours))
-            continue
-        vertices, normals, triangles, shapes = bevelled
+        vertices, normals, triangles, shapes = _bevel(body, _LARGEST_BEVEL * size)
         surfaces.append(Surface(vertices, normals, triangles, np.tile(colour, (len(vertices), 1))))
         owners += [len(surfaces) - 1] * len(shapes)
         boxes += [np.stack([points[at].min(axis=0), points[at].max(axis=0)]) for at in shapes]
@@ -69,9 +65,7 @@ def shade_bodies(bodies: tuple[Body, ...], poses: tuple[bytes, ...]) -> tuple[Su
         if surface.normals is not None:
             points, normals = surface.vertices_mm @ turn.T + shift, surface.normals @ turn.T
             # shapes of one body overlap, with faces in one plane that must look alike
-            neighbours = np.array(
-                [box for box, of in zip(boxes, owners, strict=True) if of != number]
-            )
+            neighbours = np.array(boxes)[np.array(owners) != number]
             surface.colours[:] *= _brightness(points, normals, neighbours, size)[:, None]
     return tuple(surfaces)
 
@@ -91,8 +85,8 @@ def _brightness(points: Array, normals: Array, boxes: Array, size: float) -> Arr
 
 def _bevel(
     body: Body, widest_mm: float
-) -> tuple[Array, Array, NDArray[np.integer], list[NDArray[np.integer]]] | None:
-    """Bevel the sharp edges of the closed shapes of a body; None if that is not possible.
+) -> tuple[Array, Array | None, NDArray[np.integer], Sequence[NDArray[np.integer]]]:
+    """Bevel the sharp edges of a body; one that is open or very large stays as it is.
 
     Each smooth group of triangles shrinks from its sharp edges; quadrilaterals along these edges,
     and polygons at the corners, close the gaps. Normals of the groups make the bevels look round.
@@ -100,11 +94,9 @@ def _bevel(
     """
     import trimesh
 
-    if len(body.triangles) > _MOST_TRIANGLES:
-        return None
     mesh = trimesh.Trimesh(body.vertices_mm, body.triangles, process=False)
-    if not mesh.is_watertight:
-        return None
+    if len(body.triangles) > _MOST_TRIANGLES or not mesh.is_watertight:
+        return body.vertices_mm, None, body.triangles, ()
     old, faces, count = body.vertices_mm, body.triangles.astype(np.intp), len(body.triangles)
     smooth = mesh.face_adjacency_angles <= np.deg2rad(CREASE_DEG)
     labels = trimesh.graph.connected_component_labels
