@@ -18,8 +18,8 @@ LINES, _TRIANGLES = 1, 4  # modes of a primitive
 _M_PER_MM = 1e-3
 _LARGEST_UINT16 = 65534
 _VERTICES, _INDICES = 34962, 34963  # targets of buffer views
-_COMPONENTS = {"|i1": 5120, "|u1": 5121, "<u2": 5123, "<u4": 5125, "<f4": 5126}
-_BYTES = "|i1", "|u1"  # arrays of these types are stored as shares of 127 or 255
+_COMPONENTS = {"|u1": 5121, "<u2": 5123, "<u4": 5125, "<f4": 5126}
+_BYTE = "|u1"  # bytes are stored as shares of 255
 _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
@@ -45,7 +45,7 @@ class GltfNode:
     # [V, 3], or with opacity [V, 4]; linear, any value; or bytes, shares of 255
     colours: NDArray[Any] | None = None
     # [V, n]; further values per point: NORMAL, or names that begin with an underscore
-    attributes: Mapping[str, NDArray[Any]] = field(default_factory=dict[str, NDArray[Any]])
+    attributes: Mapping[str, Array] = field(default_factory=dict[str, Array])
     # [V, 3]; morph targets: name to displacement of the points at weight 1
     targets: Mapping[str, Array] = field(default_factory=dict[str, Array])
     group: str = ""  # name of the node that holds it; the root by default
@@ -130,7 +130,7 @@ class _Arrays:
                     "type": _TYPES[rows.shape[1]],
                     "min": columns.min(axis=1).tolist(),
                     "max": columns.max(axis=1).tolist(),
-                    **({"normalized": True} if kind in _BYTES else {}),
+                    **({"normalized": True} if kind == _BYTE else {}),
                 }
             )
         if target is not None:
@@ -145,7 +145,7 @@ def _mesh(part: GltfNode, material: int, arrays: _Arrays) -> Json:
     kind = "<u2" if part.indices.max() <= _LARGEST_UINT16 else "<u4"
     primitive: Json = {
         "attributes": {
-            key: arrays.put(of, of.dtype.str if of.dtype.str in _BYTES else "<f4", _VERTICES)
+            key: arrays.put(of, _BYTE if of.dtype == np.uint8 else "<f4", _VERTICES)
             for key, of in values.items()
         },
         "indices": arrays.put(part.indices.reshape(-1), kind, _INDICES),

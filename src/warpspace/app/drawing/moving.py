@@ -6,7 +6,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from viser import ClientHandle
 from viser.transforms import SO3
 
@@ -96,11 +95,9 @@ def _solid(surface: Surface, pose: bytes) -> SceneNode:
 
 def _surface_node(surface: Surface, pose: Array, name: str, opacity: float = 1.0) -> GltfNode:
     points = transforms.apply(pose, surface.vertices_mm)
-    attributes: dict[str, NDArray[Any]] = {}
-    if surface.normals is not None:
-        normals = surface.normals @ pose[:3, :3].T
-        normals *= 127.0 / np.abs(normals).max(axis=1, initial=1.0, keepdims=True)
-        attributes["NORMAL"] = np.insert(np.rint(normals), 3, 0.0, axis=1).astype(np.int8)
+    attributes: dict[str, Array] = {}
+    if surface.normals is not None:  # rounded, which halves their bytes; viser needs floats
+        attributes["NORMAL"] = np.rint(127.0 * surface.normals @ pose[:3, :3].T) / 127.0
     linear = np.insert(srgb_to_linear(surface.colours), 3, 1.0, axis=1)
     colours = np.rint(255.0 * linear).astype(np.uint8)
     material = Material(name, opacity=opacity, lit=True)
@@ -130,7 +127,8 @@ def _shadow(rectangle: tuple[float, ...]) -> GltfNode:
     outside = np.maximum(low - points, points - high)[..., :2] / reach + SHADOW_INSET
     distance = np.linalg.norm(np.maximum(outside, 0.0), axis=-1) / (1.0 + SHADOW_INSET)
     opacity = SHADOW * np.maximum(1.0 - distance, 0.0) ** 2
-    colours = np.insert(np.zeros((opacity.size, 3)), 3, opacity.ravel(), axis=1)
+    colours = np.zeros((opacity.size, 4), np.uint8)
+    colours[:, 3] = np.rint(255.0 * opacity.ravel())
     triangles = triangulate([np.arange(opacity.size).reshape(opacity.shape)]).triangles
     material = Material("shadow", opacity=0.99)  # blended
     return GltfNode("shadow", points.reshape(-1, 3), triangles, material, colours)
