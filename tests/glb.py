@@ -17,8 +17,8 @@ def opened(data):
 def values(data, accessor):
     document, body = opened(data)
     found = document["accessors"][accessor]
-    kind = {5123: "<u2", 5125: "<u4", 5126: "<f4"}[found["componentType"]]
-    width = {"SCALAR": 1, "VEC3": 3}[found["type"]]
+    kind = {5121: "|u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}[found["componentType"]]
+    width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[found["type"]]
     view = document["bufferViews"][found["bufferView"]]
     assert view["byteLength"] >= found["count"] * width * np.dtype(kind).itemsize
     start = view["byteOffset"] + found.get("byteOffset", 0)

@@ -1,16 +1,20 @@
 """What is drawn in a real Chromium: surfaces, lines, marks, machine, rotary axes."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from app.page_tab import SCENES, same_points
+from app.frames import new_visitor
+from app.page_tab import SCENES, Tab, same_points
 from warpspace.app.browser import actions as do
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.machine_bodies import drawn_bodies, tool_point
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
-from warpspace.picture.map_mesh import isoline_pieces
+from warpspace.kinematics.transforms import apply
+from warpspace.picture.map_mesh import isoline_pieces, map_mesh
 
 LIVE = LiveModel()
 START = start_state(SCENES[0])
@@ -46,7 +50,10 @@ def test_surfaces_slices_isolines_and_marks(tab):
 
 def test_the_machine_moves_bends_and_carries_the_tool_point(tab):
     def stands(state):
-        wanted = {p.body.name: p.vertices_mm for p in drawn_bodies(LIVE.evaluate(state))}
+        wanted = {
+            p.body.name: apply(p.pose, p.surface.vertices_mm)
+            for p in drawn_bodies(LIVE.evaluate(state))
+        }
         return all(same_points(tab.drawn(f"/machine/{name}"), wanted[name]) for name in wanted)
 
     tab.send(do.ShowMachine("solid"))
@@ -66,9 +73,9 @@ def test_the_machine_moves_bends_and_carries_the_tool_point(tab):
     assert not stands(state)
     tab.send(do.ShowMachine("ghost"))
     tab.until(lambda: tab.drawn("/machine/R_bed") is None)
-    tab.until(lambda: tab.drawn("/ghost_machine/R_bed") is not None)
+    tab.until(lambda: tab.drawn("/ghost_machine") is not None)
     tab.send(do.ShowMachine("off"))
-    tab.until(lambda: tab.drawn("/ghost_machine/R_bed") is None)
+    tab.until(lambda: tab.drawn("/ghost_machine") is None)
 
 
 def test_the_table_turns_until_the_page_is_left(open_tab):
@@ -93,3 +100,52 @@ def test_the_table_turns_until_the_page_is_left(open_tab):
     worker = tab.session.worker
     tab.page.goto("about:blank")
     tab.until(lambda: not worker.is_alive())
+
+
+RECORD = """() => setInterval(() => {
+  const { warpspaceMesh: mesh, __viserMutable: view } = window, seen = (window.risen ??= []);
+  view?.nodeRefFromName?.["/box/surface"]?.traverse(part => {
+    const at = part.geometry?.attributes.position;
+    if (at && mesh) seen.push([mesh.solid, Array.from(at.array.slice(0, 300))]);
+  });
+}, 20)"""
+GREET = """() => {
+  warpspaceMesh.greet();
+  const solid = warpspaceMesh.solid;
+  dispatchEvent(new KeyboardEvent("keydown", { key: "Shift" }));
+  return [solid, warpspaceMesh.solid];
+}"""
+
+
+def test_the_first_view_grows_from_true_scale_while_the_solid_machine_becomes_its_ghost(
+    viewer, browser
+):
+    picture = LIVE.evaluate(START)
+    drawn, true = (
+        map_mesh(of).vertices_mm[:100] for of in (picture, replace(picture, exaggeration=1.0))
+    )
+    with new_visitor(browser) as context:
+        page = context.new_page()
+        page.add_init_script(f"({RECORD})()")
+        tab = Tab(page, viewer, "&rise=on")
+        tab.until(lambda: page.evaluate("risen.at(-1)[0] === 0 && risen.some(one => one[0] === 1)"))
+        seen = page.evaluate("risen")
+        shares = [
+            float(np.mean((np.reshape(points, (-1, 3)) - true) * (drawn - true)))
+            / float(np.mean((drawn - true) ** 2))
+            for _, points in seen
+        ]
+        assert shares[-1] == pytest.approx(1.0, abs=1e-3)
+        assert min(shares) < 0.5
+        while_growing = [(solid, share) for (solid, _), share in zip(seen, shares, strict=True)
+                         if 0.0 < solid < 1.0]  # fmt: skip
+        assert while_growing
+        np.testing.assert_allclose([sum(pair) for pair in while_growing], 1.0, atol=1e-2)
+        assert page.evaluate(GREET) == [1, 0], "a key ends it"
+
+
+def test_no_first_view_for_reduced_motion_and_programs(viewer, browser):
+    for query, options in (("&rise=on", {"reduced_motion": "reduce"}), ("", {})):
+        with new_visitor(browser, **options) as context:
+            tab = Tab(context.new_page(), viewer, query)
+            assert tab.page.evaluate(GREET) == [0, 0]

@@ -9,9 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from glb import opened, values
 from warpspace.app.drawing.around import arrows
 from warpspace.app.drawing.box import LIMIT_NODES, BoxLayer, limit_shapes
 from warpspace.app.drawing.camera import VIEWS, clipping, fit_camera
+from warpspace.app.drawing.moving import ghost_machine, machine
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation import machine_bodies
 from warpspace.app.evaluation.cache import Cache
@@ -255,3 +257,37 @@ def test_the_hatching_does_not_follow_a_drag():
     assert are_visible() == {True}
     points = limit_shapes(pictures[-1])[LIMIT_NODES[0]].assigned["points"]
     assert np.array_equal(drawn[LIMIT_NODES[0]][0].points, points)
+
+
+def test_only_bodies_that_move_are_sent_again_and_the_ghost_is_small():
+    picture = LIVE.evaluate(put(START, "machine.shown", "1"))
+    still, again, turned = (machine(picture, at) for at in ({}, {}, {"C": 30.0}))
+    assert {"/machine/R_bed", "/machine/C_table", "/machine/C_table_lines"} < still.keys()
+
+    def changed(shapes):
+        return {
+            name
+            for name, node in still.items()
+            if "glb_data" in node.assigned
+            and node.assigned["glb_data"] is not shapes[name].assigned["glb_data"]
+        }
+
+    assert changed(again) == set()
+    assert changed(turned) == {"/machine/C_table"}
+    ghost = ghost_machine(LIVE.evaluate(START))["/ghost_machine"]
+    assert len(ghost.assigned["glb_data"]) < 93_000, "1.1 × its plain meshes and edges"
+
+
+def test_the_shadow_lies_on_the_floor_and_fades_out_beyond_the_machine():
+    picture = LIVE.evaluate(put(START, "machine.shown", "1"))
+    data = machine(picture, {})["/machine/shadow"].assigned["glb_data"]
+    attributes = opened(data)[0]["meshes"][0]["primitives"][0]["attributes"]
+    points, colours = (values(data, attributes[name]) for name in ("POSITION", "COLOR_0"))
+    vertices = np.concatenate([part.nominal_mm for part in machine_bodies.drawn_bodies(picture)])
+    np.testing.assert_allclose(points[:, 2], vertices[:, 2].min(), atol=0.1)
+    bed = next(p for p in machine_bodies.drawn_bodies(picture) if p.body.name == "R_bed").nominal_mm
+    within = ((points > bed.min(axis=0)) & (points < bed.max(axis=0)))[:, :2].all(axis=1)
+    assert (points[:, :2].min(axis=0) < bed[:, :2].min(axis=0) - 100.0).all()
+    assert colours[within, 3].min() > colours[~within, 3].max()
+    rim = (points[:, 0] == points[:, 0].min()) | (points[:, 1] == points[:, 1].max())
+    np.testing.assert_allclose(colours[rim, 3], 0.0, atol=1e-6)

@@ -134,7 +134,13 @@ def test_every_action_is_decoded_and_handled_by_one_panel_or_by_the_session():
         panels = session.display.panels.values()
         handled = [kind for panel in panels for kind in {*panel.handlers} - PANEL_KINDS]
         in_page = {do.Signal.FIND_ERROR, do.Signal.CHOOSE_FILES}
-        in_session = {do.TabHere, do.Signal.DRAWN, do.Signal.HOLD, do.Signal.RELEASE}
+        in_session = {
+            do.TabHere,
+            do.Signal.DRAWN,
+            do.Signal.RISE,
+            do.Signal.HOLD,
+            do.Signal.RELEASE,
+        }
         kinds = {*do.Signal, *do.Input, *get_args(do.AnyAction)} - {do.Signal, do.InputValue}
         assert len(handled) == len({*handled})
         assert {*handled} == kinds - PANEL_KINDS - in_page - in_session

@@ -16,7 +16,7 @@ _THICK, _THIN = 0.055, 0.03
 _DRUM, _TUBE, _FOOT, _PEDESTAL = 1.2, 0.8, 1.6, 0.9
 """Half length of a drum, radii of tubes and of the foot, height of the pedestal, in radii."""
 _FLANGE, _SHORT = 0.15, 0.35
-"""Thickness of the tool flange, largest half of the last drum: shares of the way to the tool."""
+"""Thickness of the tool flange, largest half of the last drum, relative to the tool."""
 _APART_MM = 1.0  # between points that are drawn apart
 
 
@@ -65,12 +65,12 @@ class Arm:
 
         radius, tip = float(self.radii_mm[-1]), self.tip_mm
         apart = [tip - point for point in self.points_mm if np.linalg.norm(tip - point) > _APART_MM]
-        way = apart[-1] if apart else -2.0 * radius * self.layout.poses["t"][:3, 2]
-        length = float(np.linalg.norm(way))
-        pose: Any = geometry.align_vectors([0, 0, 1], -way / length)
+        to_tip = apart[-1] if apart else -2.0 * radius * self.layout.poses["t"][:3, 2]
+        length = float(np.linalg.norm(to_tip))
+        pose: Any = geometry.align_vectors([0, 0, 1], -to_tip / length)
         pose[:3, 3] = tip
         far = (1.0 - _SHORT) * length
-        flange = rod(tip - way, tip - (far - _FLANGE * length) / length * way, radius)
+        flange = rod(tip - to_tip, tip - (far - _FLANGE * length) / length * to_tip, radius)
         self.parts.add("S", "flange", flange)
         layout = replace(self.layout, unit_mm=radius, poses={**self.layout.poses, "t": pose})
         Head(replace(self.parts, layout=layout), self.tool).add_tool(far)

@@ -1,4 +1,4 @@
-"""Binary glTF files: unlit coloured surfaces and lines."""
+"""Binary glTF files: coloured surfaces, unlit or lit, and lines."""
 
 import json
 import struct
@@ -18,7 +18,8 @@ LINES, _TRIANGLES = 1, 4  # modes of a primitive
 _M_PER_MM = 1e-3
 _LARGEST_UINT16 = 65534
 _VERTICES, _INDICES = 34962, 34963  # targets of buffer views
-_COMPONENTS = {"<u2": 5123, "<u4": 5125, "<f4": 5126}
+_COMPONENTS = {"|u1": 5121, "<u2": 5123, "<u4": 5125, "<f4": 5126}
+_BYTE = "|u1"  # bytes are stored as shares of 255
 _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
@@ -29,6 +30,7 @@ class Material:
     name: str = "unlit"
     srgb: tuple[int, int, int] = (255, 255, 255)  # colours of the points are multiplied with it
     opacity: float = 1.0
+    lit: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +42,9 @@ class GltfNode:
     # [T, 3] or [S, 2]; numbers of the points of triangles, or of the ends of pieces of line
     indices: NDArray[np.integer[Any]]
     material: Material = Material()
-    colours: NDArray[np.floating[Any]] | None = None  # [V, 3]; linear, any value
-    # [V, n]; further values per point; the names begin with an underscore
+    # [V, 3], or with opacity [V, 4]; linear, any value; or bytes, shares of 255
+    colours: NDArray[Any] | None = None
+    # [V, n]; further values per point: NORMAL, or names that begin with an underscore
     attributes: Mapping[str, Array] = field(default_factory=dict[str, Array])
     # [V, 3]; morph targets: name to displacement of the points at weight 1
     targets: Mapping[str, Array] = field(default_factory=dict[str, Array])
@@ -127,6 +130,7 @@ class _Arrays:
                     "type": _TYPES[rows.shape[1]],
                     "min": columns.min(axis=1).tolist(),
                     "max": columns.max(axis=1).tolist(),
+                    **({"normalized": True} if kind == _BYTE else {}),
                 }
             )
         if target is not None:
@@ -140,7 +144,10 @@ def _mesh(part: GltfNode, material: int, arrays: _Arrays) -> Json:
         values["COLOR_0"] = part.colours
     kind = "<u2" if part.indices.max() <= _LARGEST_UINT16 else "<u4"
     primitive: Json = {
-        "attributes": {key: arrays.put(of, "<f4", _VERTICES) for key, of in values.items()},
+        "attributes": {
+            key: arrays.put(of, _BYTE if of.dtype == np.uint8 else "<f4", _VERTICES)
+            for key, of in values.items()
+        },
         "indices": arrays.put(part.indices.reshape(-1), kind, _INDICES),
         "mode": LINES if part.indices.shape[1] == 2 else _TRIANGLES,
         "material": material,
@@ -159,13 +166,14 @@ def _material(material: Material) -> Json:
     entries: Json = {
         "name": material.name,
         "doubleSided": True,
-        "extensions": {UNLIT: {}},
         "pbrMetallicRoughness": {
             "baseColorFactor": [*(round(float(part), 6) for part in linear), material.opacity],
             "metallicFactor": 0.0,
             "roughnessFactor": 1.0,
         },
     }
+    if not material.lit:
+        entries["extensions"] = {UNLIT: {}}
     if material.opacity < 1.0:
         entries["alphaMode"] = "BLEND"
     return entries

@@ -257,7 +257,7 @@ LIGHT, MIDDLE, DARK, METAL = (206, 210, 216), (178, 184, 192), (104, 112, 124), 
 CREASE_DEG = 30.0  # angle from flat above which an edge is drawn
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Body:
     """One body of a machine, in its frame."""
 
@@ -268,6 +268,7 @@ class Body:
     triangles: NDArray[np.int32]  # [T, 3]; Counter-clockwise seen from outside
     edges_mm: Array  # [E, 2, 3]; ends of the edges worth drawing
     warnings: tuple[str, ...] = ()  # on its surface
+    lines_mm: Array | None = None  # [L, 2, 3]; those of the edges that are drawn on its surface
 
 
 def build_body(
@@ -283,6 +284,7 @@ def build_body(
         np.array(mesh.vertices, dtype=float),
         np.array(mesh.faces, dtype=np.int32),
         edges if lines_mm is None else np.concatenate([edges, lines_mm]),
+        lines_mm=lines_mm,
     )
 
 

@@ -10,7 +10,8 @@ import numpy as np
 from warpspace.bodies.frame import generate_bodies
 from warpspace.bodies.mesh import Body
 from warpspace.bodies.mesh_files import machine_meshes
-from warpspace.bodies.schematic import BODY_FILE, read_bodies
+from warpspace.bodies.schematic import BODY_FILE, build_layout, read_bodies
+from warpspace.bodies.shading import Surface, shade_bodies
 from warpspace.field.evaluate import View, find_placement, placement_effect
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import BASE, BodyMotion, body_motions, branch_pose
@@ -103,12 +104,18 @@ class PlacedBody:
     body: Body  # mesh in its frame
     motion: BodyMotion  # nominal place of that frame, and its small motion
     exaggeration: float  # display factor of the small motion
+    surface: Surface
 
     @property
     def label(self) -> str:
         frame, _, what = self.body.name.partition("_")
         name = what if frame in ("R", "S", "t") else f"{frame} {what}"
         return name.replace("_", " ")
+
+    @property
+    def pose(self) -> Array:
+        """Drawn map from its frame to R, [4, 4]."""
+        return self.motion.drawn(self.exaggeration)
 
     @cached_property
     def vertices_mm(self) -> Array:
@@ -137,8 +144,10 @@ def place_bodies(
 ) -> tuple[PlacedBody, ...]:
     """Place the bodies of a scene, or of some of its frames, displaced by its errors or others."""
     motions = scene_motions(scene, view, amplitudes, positions)
+    bodies, at_home = load_bodies(scene.machine), build_layout(scene.machine).poses
+    surfaces = shade_bodies(bodies, tuple(at_home[body.frame].tobytes() for body in bodies))
     return tuple(
-        PlacedBody(body, motions[body.frame], exaggeration)
-        for body in load_bodies(scene.machine)
+        PlacedBody(body, motions[body.frame], exaggeration, surface)
+        for body, surface in zip(bodies, surfaces, strict=True)
         if only is None or body.frame in only
     )

@@ -52,7 +52,7 @@ def _colour(mesh: Any) -> tuple[int, int, int]:
     return red, green, blue
 
 
-SIDES, ROD_SIDES = 40, 32  # flat sides by which a circle is drawn
+SIDES = 28  # flat sides by which a circle is drawn
 Range = tuple[float, float]
 Shape = Any  # A closed mesh of trimesh
 
@@ -124,10 +124,10 @@ def rod(start: Array, end: Array, radius: float, end_radius: float | None = None
     from trimesh import creation, geometry
 
     if end_radius is None:
-        return creation.cylinder(radius=radius, segment=np.array([start, end]), sections=ROD_SIDES)
+        return creation.cylinder(radius=radius, segment=np.array([start, end]), sections=SIDES)
     length = float(np.linalg.norm(end - start))
     outline = np.array([(0.0, 0.0), (radius, 0.0), (end_radius, length), (0.0, length)])
-    mesh = creation.revolve(outline, sections=ROD_SIDES)
+    mesh = creation.revolve(outline, sections=SIDES)
     matrix: Any = geometry.align_vectors([0, 0, 1], (end - start) / length)
     matrix[:3, 3] = start
     mesh.apply_transform(matrix)

@@ -76,3 +76,16 @@ def test_colours_are_stored_as_they_are_with_any_value():
     data = build_gltf([TRIANGLE])
     colours = values(data, only_primitive(data)["attributes"]["COLOR_0"])
     np.testing.assert_array_equal(colours, COLOURS)
+
+
+def test_colours_of_bytes_are_stored_as_shares_of_a_lit_surface():
+    colours = np.array([[255, 0, 10, 255]] * 3, np.uint8)
+    lit, normals = Material("body", lit=True), np.eye(3)
+    node = GltfNode("b", POINTS, np.array([[0, 1, 2]]), lit, colours, {"NORMAL": normals})
+    data = build_gltf([node])
+    document, attributes = opened(data)[0], only_primitive(data)["attributes"]
+    assert document["accessors"][attributes["COLOR_0"]]["normalized"] is True
+    np.testing.assert_array_equal(values(data, attributes["COLOR_0"]), colours)
+    np.testing.assert_array_equal(values(data, attributes["NORMAL"]), normals)
+    assert "extensions" not in document["materials"][0]
+    assert "normalized" not in document["accessors"][attributes["POSITION"]]

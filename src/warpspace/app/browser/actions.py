@@ -34,6 +34,7 @@ class Signal(StrEnum):
     FIND_ERROR = auto()  # in the page only
     CHOOSE_FILES = auto()  # in the page only
     DRAWN = auto()  # everything sent before is drawn
+    RISE = auto()  # the first view begins
     HOLD = auto()  # a drag of a slider begins
     RELEASE = auto()
     ZERO_ERRORS = auto()

@@ -29,9 +29,50 @@
     }
     warpspaceViser.requestRender();
   };
-  let turn = 0;
+  const hold = lines => {
+    known.lines = Object.fromEntries(Object.entries(lines).map(([name, [ends, lifts]]) =>
+      [name, { ends: new Uint32Array(bytes(ends).buffer), lifts: floats(lifts) }]));
+  };
+  const isReduced = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const RISEN = "warpspace-risen", RISE_MS = 1500, RISE_LATEST_MS = 4000;
+  const SKIPS = ["keydown", "pointerdown", "wheel"];
+  let turn = 0, rising = null;  // ends the first view
+
+  // The ghost of the machine: drawn first, then hidden by everything, so that the colours of the
+  // map are true. Its colours are those of the solid machine, faded into the background.
+  const SHADOW = { transparent: false, depthWrite: false, blending: 5, blendSrc: 204, blendDst: 205,
+    blendSrcAlpha: 201, blendDstAlpha: 205 };
+  const BODY = { transparent: false, depthWrite: true, opacity: 1 };
+  const PALE = { light: [0.9, 0.9], dark: [0.07, 0.015] };  // share of its colours, and light added
 
   window.warpspaceMesh = {
+    solid: 0,  // share in which the ghost is solid
+    holdBack(theme = document.documentElement.classList.contains("ws-dark") ? "dark" : "light") {
+      const [share, light] = PALE[theme], { solid } = this, bodies = [];
+      let changed = false;
+      warpspaceViser.node("/ghost_machine")?.traverse(part => {
+        const { material } = part;
+        if (!material) return;
+        const isShadow = material.name === "shadow", look = theme + solid;
+        part.renderOrder = isShadow ? -1002 : -1001;
+        if (!isShadow) bodies.push(part);
+        if (material.userData.look === look) return;
+        Object.assign(material, isShadow ? SHADOW : BODY);
+        if (!isShadow) {
+          material.color.setScalar(share + solid * (1 - share));
+          material.emissive.setScalar(light * (1 - solid));
+        }
+        material.userData.look = look;
+        material.needsUpdate = changed = true;
+      });
+      const last = bodies.at(-1);
+      if (last) {
+        last.renderOrder = -1000;
+        last.frustumCulled = false;
+        last.onAfterRender = renderer => renderer.clearDepth();
+      }
+      if (changed) warpspaceViser.requestRender();
+    },
     glide: 0,  // duration of the next changes, ms; between steps of a story
     next: 0,  // duration of the next change only, ms
     moves: 0,  // number of changes, for benchmarks
@@ -39,8 +80,7 @@
     open({ count, palette, lines }) {
       known.count = count;
       known.palette = floats(palette);
-      known.lines = Object.fromEntries(Object.entries(lines).map(([name, [ends, lifts]]) =>
-        [name, { ends: new Uint32Array(bytes(ends).buffer), lifts: floats(lifts) }]));
+      hold(lines);
     },
     bend(points, colours) {
       const mesh = find("/box/surface", part => part.isMesh && part.geometry.attributes.color);
@@ -60,9 +100,55 @@
       this.moves++;
       return true;
     },
+    // at the very first visit the machine is solid until the answer arrives; the address of a page
+    // opened by a program contains fixedDpr
+    greet() {
+      const address = new URLSearchParams(location.search);
+      try {
+        const isKnown = localStorage.getItem(RISEN) || address.has("fixedDpr");
+        if (isReduced() || isKnown && address.get("rise") !== "on") return;
+        localStorage.setItem(RISEN, "1");
+      } catch { return; }  // it would be repeated at each visit
+      const end = () => {
+        for (const name of SKIPS) removeEventListener(name, end, true);
+        rising = null;
+        this.show?.(1);
+        this.solid = 0;
+        this.holdBack();
+      };
+      rising = end;
+      this.solid = 1;
+      for (const name of SKIPS) addEventListener(name, end, true);
+      setTimeout(() => rising?.(), RISE_LATEST_MS);
+      warpspacePage.send("rise");
+    },
+    // from true scale to the errors drawn, while the solid machine becomes its ghost
+    rise(nominal, lines) {
+      const mesh = find("/box/surface", part => part.isMesh && part.geometry.attributes.color);
+      const at = mesh?.geometry.attributes, from = nominal && floats(nominal), current = ++turn;
+      if (!rising) return;
+      if (at && from?.length === at.position.array.length) {
+        const place = at.position.array.slice(), shade = at.color.array.slice();
+        hold(lines);
+        this.show = share => {
+          for (const name of ["/limit/line", "/limit/hatching"]) {
+            const line = warpspaceViser.node(name);
+            if (line) line.visible = share === 1;
+          }
+          if (current === turn) draw(mesh, place.map((x, i) => from[i] + share * (x - from[i])), shade);
+        };
+      }
+      this.eased(RISE_MS, share => {
+        if (!rising) return;
+        if (share === 1) { rising(); return; }
+        this.show?.(share);
+        this.solid = 1 - share;
+        this.holdBack();
+      });
+    },
     // call with a share that goes from 0 to 1 during a time, ms
     eased(duration, call) {
-      if (!duration || matchMedia("(prefers-reduced-motion: reduce)").matches) { call(1); return; }
+      if (!duration || isReduced()) { call(1); return; }
       const start = performance.now();
       const next = now => {
         const part = Math.min(1, Math.max(0, now - start) / duration);

@@ -220,21 +220,6 @@
       <text x="${(36 * x).toFixed(1)}" y="${(36 * y).toFixed(1)}">${name}</text></g>`).join("");
   };
 
-  // the ghost of the machine is drawn first and hides nothing, so that the colours of the map are true
-  const GHOST = { transparent: false, depthWrite: false, blending: 5, blendSrc: 204, blendDst: 205,
-    blendSrcAlpha: 201, blendDstAlpha: 205 };
-  const holdBackGhost = () => {
-    let changed = false;
-    warpspaceViser.node("/ghost_machine")?.traverse(part => {
-      if (!part.material) return;
-      part.renderOrder = -1000;
-      if (part.material.blending === GHOST.blending && !part.material.transparent) return;
-      Object.assign(part.material, GHOST);
-      part.material.needsUpdate = changed = true;
-    });
-    if (changed) warpspaceViser.requestRender();
-  };
-
   // the selected trace and measured distances are never hidden by the box
   const FORWARD = ["/traces/actual", "/traces/nominal", "/measured/nominal", "/measured/actual", "/measured/points"];
   const bringForward = () => {
@@ -270,7 +255,7 @@
     if (!canvas?.isConnected || !camera || !world) return;
     const rect = canvas.getBoundingClientRect();
     const now = performance.now();
-    if (now > plates) { plates = now + PLATE_MS; holdBackGhost(); bringForward(); }
+    if (now > plates) { plates = now + PLATE_MS; warpspaceMesh.holdBack(); bringForward(); }
     const layout = `${rect.x},${rect.y},${rect.width},${rect.height}`;
     const looks = camera.matrixWorld.elements.join() + camera.projectionMatrix.elements.join();
     if (layout + looks === drawnLayout) return;

@@ -409,7 +409,7 @@
     // progress of the page, for tests
     stage(word) {
       document.documentElement.dataset.warpspace = word;
-      if (word === "open") this.hints();
+      if (word === "open") { warpspaceMesh.greet(); this.hints(); }
     },
     // report when everything before it is drawn
     drawn() {

@@ -51,5 +51,6 @@
   listen();
   back.onclick = () => go(at - 1);
   on.onclick = () => go(at + 1);
+  setInterval(() => frame.contentWindow.warpspaceMesh?.holdBack(document.documentElement.className), 250);
   draw(0);
 })();

@@ -31,6 +31,7 @@ from warpspace.app.drawing.box import box, limit_shapes, line_facts, packed
 from warpspace.app.drawing.camera import CameraMemory, fit_camera
 from warpspace.app.drawing.colours import colour_levels, level_colours
 from warpspace.app.drawing.labels import axes_room_mm, note_labels, point_labels
+from warpspace.app.drawing.moving import draw_machine
 from warpspace.app.drawing.shapes import SCENE_PER_MM, Nodes, Shapes, ball, light_scene
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -89,7 +90,8 @@ def build_offline_html(
     """Build the page: the interactive scene with colour bar, statistics and exaggeration."""
     conditions = list(legend.picture_conditions(picture))
     about = {**(provenance or {}), **({"conditions": conditions} if conditions else {})}
-    drawn = box(picture), limit_shapes(picture), draw_surroundings(picture), draw_labels(picture)
+    drawn = (box(picture), limit_shapes(picture), draw_surroundings(picture), draw_machine(picture),
+             draw_labels(picture))  # fmt: skip
     shapes = {name: shape for shapes in drawn for name, shape in shapes.items()}
     steps = [PageStep(picture, camera or _usual_camera(picture))]
     return _build_page(picture.title, steps, shapes, about)

@@ -2,6 +2,7 @@
 
 import json
 from base64 import b64encode
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -152,6 +153,15 @@ def only_bent(drawn: LivePicture, picture: LivePicture) -> bool:
         and not after.look.isolines and not after.look.pass_fail and picture.faded is None
         and after.look.surface in ("surface", "cut") and not picture.is_rotary
     )  # fmt: skip
+
+
+def rise_script(picture: LivePicture) -> str:
+    """Build the script in which a box grows from true scale, `rise` of `mesh.js`."""
+    if not only_bent(picture, picture):
+        return "warpspaceMesh.rise(null);"
+    drawn, flat = (map_mesh.map_mesh(of) for of in (picture, replace(picture, exaggeration=1.0)))
+    lines = line_facts(picture, drawn.vertices_mm)["lines"]
+    return f'warpspaceMesh.rise("{packed(flat.vertices_mm.astype("<f4"))}",{json.dumps(lines)});'
 
 
 def line_facts(picture: LivePicture, vertices_mm: Array) -> dict[str, object]:

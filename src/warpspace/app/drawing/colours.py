@@ -69,9 +69,6 @@ COLOURS: Mapping[str, tuple[Rgb, Rgb]] = {
     "trace_actual": ((206, 84, 8), (224, 142, 62)),  # the only accent
     "trace_elsewhere": ((196, 202, 211), (84, 92, 104)),
     "axis": ((110, 120, 135), (150, 158, 170)),
-    "body_edge": ((70, 78, 90), (150, 158, 170)),
-    "ghost_body": ((120, 132, 150), (150, 160, 176)),
-    "ghost_body_edge": ((226, 230, 235), (48, 54, 63)),
 }
 
 

@@ -1,7 +1,8 @@
 """The layer around the box: surroundings, machine, and the rotating table."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,8 @@ from viser.transforms import SO3
 
 from warpspace.app.browser.page import Page
 from warpspace.app.drawing.around import GIZMO, draw_surroundings, program_point, turned_points
-from warpspace.app.drawing.colours import Rgb, colour
-from warpspace.app.drawing.shapes import SCENE_PER_MM, Nodes, SceneNode, Shapes, ball, lines, mesh
+from warpspace.app.drawing.colours import colour
+from warpspace.app.drawing.shapes import SCENE_PER_MM, UNLIT, Nodes, SceneNode, Shapes, ball, lines
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import (
     drawn_bodies,
@@ -22,8 +23,13 @@ from warpspace.app.evaluation.machine_bodies import (
 )
 from warpspace.app.evaluation.scene_overlays import moved_place
 from warpspace.app.state.leaf import Identity
+from warpspace.bodies.gltf import GltfNode, Material, build_gltf
 from warpspace.bodies.placed import PlacedBody
+from warpspace.bodies.shading import Surface
+from warpspace.geometry.colour import srgb_to_linear
+from warpspace.geometry.surfaces import triangulate
 from warpspace.kinematics import transforms
+from warpspace.units import Array
 
 STEP_S = 0.125  # between two pictures of a rotating table; each is sent to the page
 LONGEST_STEP_S = 0.5  # longer delays are skipped
@@ -31,8 +37,12 @@ SPEEDS_DEG_S = (10.0, 30.0, 90.0)
 PROGRAM = "program"  # what plays, in place of the name of an axis
 PROGRAM_S = 20.0  # time of a whole program at the middle speed
 
+SLOT = (70, 78, 90)  # colour of the slots of tables
 BALL = 0.010  # marker of the tool point, relative to the longest edge
-OPACITY = 0.045
+SHADOW, SHADOW_REACH, SHADOW_INSET = 0.3, 0.16, 0.25
+"""Shadow of a machine: opacity, width of its rim relative to the machine, share of it inside."""
+SHADOW_STEPS = 6
+FOOT = 0.15  # share of the height of a machine that stands on the floor
 GIZMO_SIZE = 0.3  # relative to the longest edge
 
 
@@ -44,29 +54,84 @@ def machine(picture: LivePicture, turned: Mapping[str, float]) -> Shapes:
     """
     is_shown, shapes = picture.state.machine.shown, dict[str, SceneNode | None]()
     if is_shown or turned or picture.is_rotary:
-        edge = colour(picture, "body_edge")
-        for part in drawn_bodies(picture, turned):
-            shapes |= _body("/machine", part, part.body.colour, edge)
-    if is_shown and not picture.is_rotary:
-        at, size = tool_point(picture)[0], BALL * picture.size_mm
-        shapes["/machine/tool_point"] = ball(at, size, colour(picture, "edge"))
+        parts = drawn_bodies(picture, turned)
+        for part in parts:
+            shapes[f"/machine/{part.body.name}"] = _solid(part.surface, part.pose.tobytes())
+            if part.body.lines_mm is not None:
+                slots = transforms.apply(part.pose, part.body.lines_mm)
+                shapes[f"/machine/{part.body.name}_lines"] = lines(slots, SLOT, 1.2)
+        if is_shown and not picture.is_rotary:
+            at, size = tool_point(picture)[0], BALL * picture.size_mm
+            shapes["/machine/tool_point"] = ball(at, size, colour(picture, "edge"))
+            shapes["/machine/shadow"] = _shadow_alone(_footprint(parts))
     return shapes
+
+
+def draw_machine(picture: LivePicture) -> Shapes:
+    """Draw the machine as selected, solid or as its ghost, for a page without animation."""
+    return {**machine(picture, {}), **(ghost_machine(picture) if has_ghost(picture) else {})}
+
+
+def has_ghost(picture: LivePicture) -> bool:
+    of = picture.state.machine
+    return of.ghost and not of.shown and not picture.is_rotary
 
 
 def ghost_machine(picture: LivePicture) -> Shapes:
-    rgb, edge = (colour(picture, name) for name in ("ghost_body", "ghost_body_edge"))
-    shapes: dict[str, SceneNode | None] = {}
-    for part in drawn_bodies(picture, nominal=True):
-        shapes |= _body("/ghost_machine", part, rgb, edge, opacity=OPACITY)
-    return shapes
+    """Draw the nominal machine as one node: `browser/mesh.js` shows it pale, behind everything."""
+    parts = drawn_bodies(picture, nominal=True)
+    nodes = [_surface_node(part.surface, part.pose, "ghost", opacity=0.0) for part in parts]
+    return {"/ghost_machine": _glb(_shadow(_footprint(parts)), *nodes)}
 
 
-def _body(root: str, part: PlacedBody, rgb: Rgb, edge: Rgb, **options: object) -> Shapes:
-    name, triangles = f"{root}/{part.body.name}", part.body.triangles
-    return {
-        name: mesh(part.vertices_mm, triangles, rgb, flat_shading=True, **options),
-        f"{name}_edges": lines(part.edges_mm, edge, 0.9),
-    }
+def _glb(*nodes: GltfNode) -> SceneNode:
+    return SceneNode("add_glb", UNLIT, {"glb_data": build_gltf(nodes)})
+
+
+@lru_cache(maxsize=128)
+def _solid(surface: Surface, pose: bytes) -> SceneNode:
+    return _glb(_surface_node(surface, np.frombuffer(pose).reshape(4, 4), "body"))
+
+
+def _surface_node(surface: Surface, pose: Array, name: str, opacity: float = 1.0) -> GltfNode:
+    points = transforms.apply(pose, surface.vertices_mm)
+    attributes: dict[str, Array] = {}
+    if surface.normals is not None:  # rounded, which halves their bytes; viser needs floats
+        attributes["NORMAL"] = np.rint(127.0 * surface.normals @ pose[:3, :3].T) / 127.0
+    linear = np.insert(srgb_to_linear(surface.colours), 3, 1.0, axis=1)
+    colours = np.rint(255.0 * linear).astype(np.uint8)
+    material = Material(name, opacity=opacity, lit=True)
+    return GltfNode(name, points, surface.triangles, material, colours, attributes)
+
+
+def _footprint(parts: Sequence[PlacedBody]) -> tuple[float, ...]:
+    """Return the rectangle on which a machine stands, [x, y, z] to [x, y, z], mm."""
+    points = np.concatenate([part.nominal_mm for part in parts])
+    low, high = points.min(axis=0), points.max(axis=0)
+    standing = points[points[:, 2] < low[2] + FOOT * (high - low)[2]]
+    return tuple(np.round([*standing.min(axis=0), *standing.max(axis=0)], 1).tolist())
+
+
+@lru_cache(maxsize=8)
+def _shadow_alone(rectangle: tuple[float, ...]) -> SceneNode:
+    return _glb(_shadow(rectangle))
+
+
+def _shadow(rectangle: tuple[float, ...]) -> GltfNode:
+    """Build the soft shadow of a machine on its floor: a rectangle with a round, fading rim."""
+    low, high = np.reshape(rectangle, (2, 3))
+    reach = SHADOW_REACH * float((high - low)[:2].max())
+    steps = reach * np.linspace(-SHADOW_INSET, 1.0, SHADOW_STEPS)
+    sides = [np.concatenate([low[k] - steps[::-1], high[k] + steps]) for k in (0, 1)]
+    points = np.stack(np.meshgrid(*sides, low[2]), axis=-1)[:, :, 0]  # [n, n, 3]
+    outside = np.maximum(low - points, points - high)[..., :2] / reach + SHADOW_INSET
+    distance = np.linalg.norm(np.maximum(outside, 0.0), axis=-1) / (1.0 + SHADOW_INSET)
+    opacity = SHADOW * np.maximum(1.0 - distance, 0.0) ** 2
+    colours = np.zeros((opacity.size, 4), np.uint8)
+    colours[:, 3] = np.rint(255.0 * opacity.ravel())
+    triangles = triangulate([np.arange(opacity.size).reshape(opacity.shape)]).triangles
+    material = Material("shadow", opacity=0.99)  # blended
+    return GltfNode("shadow", points.reshape(-1, 3), triangles, material, colours)
 
 
 class MovingLayer:
@@ -120,7 +185,7 @@ class MovingLayer:
 
     def _draw_ghost(self, picture: LivePicture) -> None:
         state = picture.state
-        on = state.machine.ghost and not state.machine.shown and not picture.is_rotary
+        on = has_ghost(picture)
         of = on and (
             Identity(state.scene), state.view_key, state.shown.dark, state.shows_rotary,
             Identity(state.machine.linear_mm), Identity(state.positions),

@@ -87,13 +87,6 @@ def lines(
     return SceneNode("add_line_segments", constant, assigned) if len(pieces) else None
 
 
-def mesh(vertices_mm: Array, triangles: NDArray[Any], rgb: Rgb, **options: object) -> SceneNode:
-    """Draw a lit body; `options` are those of viser."""
-    constant = {"faces": triangles.astype(np.uint32), **UNLIT, **options}
-    assigned = {"vertices": vertices_mm.astype(np.float32), "color": rgb}
-    return SceneNode("add_mesh_simple", constant, assigned)
-
-
 def ball(at_mm: Array, radius_mm: float, rgb: Rgb) -> SceneNode:
     constant = {**UNLIT, "scale": radius_mm * SCENE_PER_MM}
     return SceneNode("add_icosphere", constant, {"position": at_mm * SCENE_PER_MM, "color": rgb})

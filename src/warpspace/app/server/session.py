@@ -27,7 +27,7 @@ import numpy as np
 
 from warpspace.app.browser import actions as do
 from warpspace.app.browser.viser_private import queued
-from warpspace.app.drawing.box import BoxLayer
+from warpspace.app.drawing.box import BoxLayer, rise_script
 from warpspace.app.drawing.camera import focus
 from warpspace.app.drawing.moving import MovingLayer
 from warpspace.app.drawing.shapes import SCENE_PER_MM
@@ -370,6 +370,8 @@ class Session:
             is_held, context = action is do.Signal.HOLD, self.context
             self._drag_start = context.picture if is_held else None
             context.held_since = context.changed_at if is_held else None
+        if action is do.Signal.RISE and self.context.picture is not None:
+            self.context.page.run_script(rise_script(self.context.picture))
         if not isinstance(action, do.TabHere) or self._is_identified:
             return
         self._is_identified = True

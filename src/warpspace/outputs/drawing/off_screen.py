@@ -102,9 +102,9 @@ class RenderedBody:
     # [M]; coloured values; interpolated over each triangle before they become colours
     values: Array | None = None
     scale: ColourScale | None = None  # colours of the values
-    # one colour (sRGB, 0 to 1) for a body without values
-    colour: tuple[float, float, float] = (0.7, 0.7, 0.7)
-    shaded: bool = False  # lit: machine bodies, never coloured errors
+    # [M, 3]; sRGB, 0 to 1, of a body that is lit: of a machine, never of errors
+    colours: Array | None = None
+    normals: Array | None = None  # [M, 3], of a lit body; None for flat triangles
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +185,7 @@ def _draw(
         plotter.disable_anti_aliasing()
         for body in bodies:
             _add_body(plotter, body)
-        if any(body.shaded for body in bodies):
+        if any(body.colours is not None for body in bodies):
             light = projection.towards + 1.1 * projection.up - 0.7 * projection.right
             plotter.add_light(pv.Light(position=tuple(light), focal_point=(0.0, 0.0, 0.0)))
         camera = plotter.camera
@@ -238,9 +238,12 @@ def _add_body(plotter: "pv.Plotter", body: RenderedBody) -> None:
     mesh = pv.PolyData.from_regular_faces(
         np.ascontiguousarray(body.vertices_mm, dtype=float), body.triangles
     )
-    look: dict[str, Any] = {"color": body.colour, "lighting": body.shaded}
-    if body.shaded:
-        look |= {"interpolation": "flat", "ambient": 0.45, "diffuse": 0.6}
+    look: dict[str, Any] = {"lighting": body.colours is not None}
+    if body.colours is not None:
+        look |= {"scalars": body.colours, "rgb": True, "ambient": 0.52, "diffuse": 0.6}
+    if body.normals is not None:
+        mesh.point_data.active_normals = body.normals
+        look["interpolation"] = "phong"
     if body.values is not None and body.scale is not None:
         # VTK lays the first and the last colour half a colour inside the ends of its range
         half = 0.5 * (body.scale.high - body.scale.low) / (LEVELS - 1)

@@ -10,6 +10,7 @@ from warpspace.exceptions import OptionError
 from warpspace.geometry import surfaces
 from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.kinematics.chain import BASE
+from warpspace.kinematics.transforms import apply, rotate
 from warpspace.machine.definition import Vector
 from warpspace.outputs.drawing import map3d, off_screen
 from warpspace.outputs.drawing.canvas import Canvas, Occupancy, write_label
@@ -41,10 +42,13 @@ DARKER = 0.62
 
 
 def _drawn_body(part: PlacedBody, theme: Theme) -> off_screen.RenderedBody:
-    shade = 1.0 if theme is LIGHT else DARKER
-    red, green, blue = (shade * channel / 255.0 for channel in part.body.colour)
-    triangles, colour = part.body.triangles.astype(np.intp), (red, green, blue)
-    return off_screen.RenderedBody(part.vertices_mm, triangles, colour=colour, shaded=True)
+    surface, shade = part.surface, 1.0 if theme is LIGHT else DARKER
+    return off_screen.RenderedBody(
+        apply(part.pose, surface.vertices_mm),
+        surface.triangles.astype(np.intp),
+        colours=shade * surface.colours,
+        normals=None if surface.normals is None else rotate(part.pose[:3, :3], surface.normals),
+    )
 
 
 def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
