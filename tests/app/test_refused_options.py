@@ -13,6 +13,7 @@ from warpspace.app.panels.page_panels import PANELS
 from warpspace.app.panels.upload_panels import Import, ImportPanel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.form_values import read_form
+from warpspace.app.state.tree import put
 from warpspace.bench.base import bench_names, find_test
 from warpspace.exceptions import WarpspaceError
 from warpspace.formats.source import source_of_text
@@ -30,7 +31,7 @@ def stop(_share: float) -> None:
 def messages(name: str, scene_name: str) -> list[str]:
     """Refuse every option of a section with every bad text; return what the section shows."""
     part = lone_part(PANELS.get(name, AnalysisPanel), name)
-    state = start_state(load_scene(scene_name))
+    state = put(start_state(load_scene(scene_name)), "specification.limit_um", "50")
     shown = [html.unescape(str(part.options_html(state)))]
     scenes = part.scenes(state)
     for option in part.shown_options(state):

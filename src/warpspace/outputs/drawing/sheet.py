@@ -209,13 +209,13 @@ def draw_heading(canvas: Canvas, title: str, facts: Sequence[str]) -> float:
 
 def _wrap(
     canvas: Canvas, parts: Sequence[str], max_width: float, size: float, weight: str = "normal",
-    between: str = " · ", most: int = 2,
+    between: str = " · ", max_rows: int = 2,
 ) -> list[str]:  # fmt: skip
     rows: list[str] = []
     for part in parts:
         joined = f"{rows[-1]}{between}{part}" if rows else part
         fits = canvas.text_size(joined, size, weight)[0] <= max_width
-        if rows and (fits or len(rows) == most):
+        if rows and (fits or len(rows) == max_rows):
             rows[-1] = joined
         else:
             rows.append(part)
