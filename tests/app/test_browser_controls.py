@@ -46,7 +46,7 @@ def test_keys_on_rows_buttons_tabs_and_boxes_do_not_move_the_camera(tab: Tab):
 
 def test_a_rejected_value_reverts_with_the_reason(tab: Tab):
     tab.page.click("[data-key=menu-exaggeration] summary")
-    box = tab.page.locator("#ws-state-set-exaggeration")
+    box = tab.page.locator("#ws-SetLeaf-exaggeration")
     for text, value in (("abc", "1000"), ("5e9", "1000000"), ("6e9", "1000000")):
         box.fill(text)
         box.press("Enter")
@@ -111,4 +111,4 @@ def test_messages_and_menus_cover_nothing_and_notes_are_reached_at_every_size(op
         page.locator("#ws-window").get_by_role("button", name="Notes", exact=True).click()
         page.locator("#ws-notes header").wait_for()
         assert tab.in_sight("#ws-notes header")
-        page.locator("#ws-notes [data-do='notes:close']").click()
+        page.locator("#ws-notes [data-do='close_notes']").click()

@@ -52,9 +52,9 @@ def test_a_drag_is_one_step_of_undo_however_long_it_takes(monkeypatch):
     with opened(FIRST) as (wire, session):
         steps = session.context.store.past
         for held, values, count in ((True, ("200", "300", "400"), 1), (False, ("500", "600"), 3)):
-            wire.say("tab:hold" if held else "tab:release")
+            wire.say(do.Signal.HOLD if held else do.Signal.RELEASE)
             for value in values:
-                wire.say("errors:set.EA0Z", value)
+                wire.say(do.SetError("EA0Z", value))
                 at = float(value)
                 assert wire.read_until(lambda at=at: session.state.amplitudes["EA0Z"] == at)
             assert len(steps) == count
