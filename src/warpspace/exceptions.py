@@ -19,10 +19,19 @@ def shorten(text: str) -> str:
 
 
 class WarpspaceError(Exception):
-    """Base of all exceptions; the message is meant for the user."""
+    """Base of all exceptions; the message is meant for the user.
+
+    The text names an option of an analysis as ``{its_name}``; `with_names` puts in what it is
+    called where it is read: a flag on the command line, a label on a page.
+    """
+
+    def with_names(self, name_of: Callable[[str], str]) -> str:
+        """Return the message with each option named as the reader knows it."""
+        text = re.sub(r"\{([a-z_]+)\}", lambda found: name_of(found[1]), super().__str__())
+        return shorten(text)
 
     def __str__(self) -> str:
-        return shorten(super().__str__())
+        return self.with_names(lambda name: name)
 
 
 class ChainError(WarpspaceError):
@@ -30,18 +39,7 @@ class ChainError(WarpspaceError):
 
 
 class OptionError(WarpspaceError):
-    """An invalid value of an option, argument or widget.
-
-    The text names an option of an analysis as ``{its_name}``; `said` puts in what it is called
-    where it is read: a flag on the command line, a label on a page.
-    """
-
-    def with_names(self, name_of: Callable[[str], str]) -> str:
-        """Return the message with each option named as the reader knows it."""
-        return re.sub(r"\{([a-z_]+)\}", lambda found: name_of(found[1]), super().__str__())
-
-    def __str__(self) -> str:
-        return self.with_names(lambda name: name)
+    """An invalid value of an option, argument or widget."""
 
 
 class RenderError(WarpspaceError):

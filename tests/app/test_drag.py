@@ -12,6 +12,7 @@ from warpspace.app.documents import legend
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.live_model import DrawnScale
 from warpspace.app.server.session import same_scales
+from warpspace.app.state import store
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
 from warpspace.scene.library import load_scene
@@ -44,6 +45,19 @@ def test_a_drag_keeps_exaggeration_and_colours_until_its_end():
         chosen = LIVE.evaluate(session.state)
         assert (after.exaggeration, after.scale) == (chosen.exaggeration, chosen.scale)
         assert wire.read_until(lambda: end not in wire.pieces["legend"])
+
+
+def test_a_drag_is_one_step_of_undo_however_long_it_takes(monkeypatch):
+    monkeypatch.setattr(store, "SAME_STEP_S", 1e-9)
+    with opened(FIRST) as (wire, session):
+        steps = session.context.store.past
+        for held, values, count in ((True, ("200", "300", "400"), 1), (False, ("500", "600"), 3)):
+            wire.say(do.Signal.HOLD if held else do.Signal.RELEASE)
+            for value in values:
+                wire.say(do.SetError("EA0Z", value))
+                at = float(value)
+                assert wire.read_until(lambda at=at: session.state.amplitudes["EA0Z"] == at)
+            assert len(steps) == count
 
 
 def test_a_typed_number_rescales_at_once():

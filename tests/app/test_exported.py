@@ -216,6 +216,20 @@ def test_stored_provenance_can_be_read_back():
     assert json.loads(stored.group(1)) == {"title": EVIL, "n": 1}
 
 
+UP_AND_PLACE = """() => {
+  const { up, position } = window.__viserMutable.camera;
+  return [...up.toArray(), ...position.toArray()];
+}"""
+TURN_OVER = """() => {
+  const { camera, cameraControl } = window.__viserMutable;
+  camera.up.set(0, 0, 1);
+  cameraControl.updateCameraUp();
+  cameraControl.setLookAt(3, 9, 2, 0, 0, 0, false);
+}"""
+VISIBLE_CONTROLS = """() => [...document.querySelectorAll("button, [role=alert]")]
+  .filter(part => part.checkVisibility()).length"""
+
+
 def test_opens_without_network_and_draws(browser, tmp_path):
     path = tmp_path / "scene.html"
     path.write_text(page_of(replace(FIRST, title=EVIL)), encoding="utf-8")
@@ -223,6 +237,23 @@ def test_opens_without_network_and_draws(browser, tmp_path):
         assert "exaggeration ×1000" in page.inner_text("header")
         wait_for_the_map(page, page.frame_locator("iframe").locator("canvas").first, 20_000)
         assert page.title() == f"{EVIL} · warpspace"
+        bars = [bar.inner_text() for bar in page.locator("[data-bar-scale]").all()]
+        assert [re.sub("^[0-9]+ ", "", text) for text in bars] == [
+            "mm geometry", "µm error, drawn ×1000"
+        ]  # fmt: skip
+        (_, drawing) = page.frames
+        assert not drawing.evaluate(VISIBLE_CONTROLS)
+        # as if the first camera of viser, which may be any way up, arrived after ours
+        upright = drawing.evaluate(UP_AND_PLACE)
+        drawing.evaluate(TURN_OVER)
+        page.wait_for_timeout(500)
+        assert drawing.evaluate(UP_AND_PLACE) == pytest.approx(upright, abs=1e-3)
+        page.mouse.move(600, 500)
+        page.mouse.down()
+        page.mouse.move(700, 520, steps=4)
+        page.mouse.up()
+        page.wait_for_timeout(500)
+        assert drawing.evaluate(UP_AND_PLACE) != pytest.approx(upright, abs=0.1)
 
 
 def test_a_picture_of_the_screen_says_what_it_shows_beside_its_pixels():

@@ -107,10 +107,10 @@ def test_figure_and_path_follow_the_errors(name):
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("circular", {"radius_mm": "much"}, "Radius 'much'; expected a number"),
+        ("circular", {"radius_mm": "much"}, "“Radius” 'much'; expected a number"),
         ("circular", {"radius_mm": "900"}, "leaves the working volume"),
         ("circular", {"points": "20000"}, "expected at most 20,000 in the app"),
-        ("r-test", {"at": "Q=1"}, "At 'Q=1': unknown axis Q; expected one of"),
+        ("r-test", {"at": "Q=1"}, "“At” 'Q=1': unknown axis Q; expected one of"),
     ],
 )
 def test_what_cannot_be_run_is_said_in_its_place(name, options, message):

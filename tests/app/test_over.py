@@ -9,7 +9,16 @@ import pytest
 import warpspace
 from app.parts import LIVE, Alone, lone_part, section, wait
 from warpspace.app.browser import actions as do
-from warpspace.app.documents.legend import legend_html, marked, marks, ticks, within_limit_words
+from warpspace.app.documents.legend import (
+    largest_words,
+    legend_html,
+    marked,
+    marks,
+    place_words,
+    ticks,
+    within_limit_words,
+)
+from warpspace.app.drawing.box import box, only_bent
 from warpspace.app.drawing.colours import colour_levels
 from warpspace.app.drawing.labels import axes, point_labels
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
@@ -23,6 +32,7 @@ from warpspace.app.panels.overlay import (
     HeadPanel,
     LegendPanel,
     OrderPanel,
+    cause_words,
     chosen_map,
 )
 from warpspace.app.state.app_state import NOBODY, Side, start_state
@@ -102,6 +112,19 @@ def test_the_colour_bar_has_round_numbers_and_the_limit_as_a_mark():
         assert min(np.diff(placed)) > 0.07
         for text, at in of_scale:
             assert float(text.replace("−", "-")) == pytest.approx(low + at * (high - low))
+
+
+def test_without_errors_nothing_overlaps():
+    zero = limited(50.0).zeroed()
+    nominal, bent = LIVE.evaluate(zero), LIVE.evaluate(limited(50.0))
+    assert "/ghost" not in box(nominal)  # its lines would be those of the actual box
+    assert "/ghost" not in box(LIVE.evaluate(replace(limited(50.0), exaggeration=1.0)))
+    assert "/ghost" in box(bent)
+    assert not only_bent(bent, nominal)
+    assert [mark.name for mark in marks(nominal)] == ["limit"]
+    assert marks(LIVE.evaluate(start_state(FIRST).zeroed())) == []
+    assert place_words(nominal) == cause_words(nominal) == ""
+    assert largest_words(nominal) == "No errors"
 
 
 def test_a_scene_file_carries_the_limit():

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 from PIL import Image
 
@@ -197,6 +198,42 @@ def test_charts_stand_on_a_dark_ground_with_light_ink(name):
     assert np.median(dark) < 40
     assert (dark > 200).mean() > 0.002
     assert np.median(light) > 240
+
+
+TITLE = "A machine after its repair in November, measured with the laser tracker and the ball bar"
+
+
+@pytest.mark.parametrize("name", ["error-map", "montecarlo", "ballbar"])
+def test_a_long_title_is_wrapped(name):
+    scene = replace(load_scene("dvf5000_general"), title=TITLE)
+    figure = draw_figure(name, [scene], FigureSettings(size=(1000, 800), grid=7)).figure
+    texts = figure.findobj(Text)
+    assert TITLE in " ".join(" ".join(text.get_text() for text in texts).split())
+    renderer, width = FigureCanvasAgg(figure).get_renderer(), figure.bbox.width
+    assert max(text.get_window_extent(renderer).x1 for text in texts) <= width
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("traces", "nominal traces only"), ("rotary", "No error"), ("ballbar", "No error")],
+)
+def test_a_figure_without_errors_says_so_and_draws_no_zeros(name, words):
+    figure = draw_figure(name, [load_scene("dvf5000_nominal")], FigureSettings(grid=7)).figure
+    texts = [text.get_text() for text in figure.findobj(Text)]
+    assert words in " ".join(texts)
+    assert not [text for text in texts if text.endswith((": 0 µm", "µm apart"))]
+
+
+def test_numbers_of_neighbouring_panels_keep_apart():
+    figure = draw_figure("gains", [FIRST], FigureSettings()).figure
+    axes = sorted(figure.axes, key=lambda one: one.get_position().x0)
+    boxes = [
+        label.get_window_extent()
+        for one in axes
+        for label, at in zip(one.get_xticklabels(), one.get_xticks(), strict=True)
+        if one.get_xlim()[0] <= at <= one.get_xlim()[1]
+    ]
+    assert all(left.x1 < right.x0 for left, right in itertools.pairwise(boxes))
 
 
 def test_traces_of_the_figure_hold_the_reference_point_still_like_the_export():

@@ -468,7 +468,7 @@ def frame_notes(fit: Fit) -> tuple[str, ...]:
     note = (
         f"{files}: in the {frame} frame these vectors leave residuals of"
         f" {UM_PER_MM * solve.rms_mm(fit.after):.3g} µm (RMS), in the {other} frame"
-        f" {UM_PER_MM * best_rms:.3g} µm: the result is likely wrong; expected --frame {other},"
-        f" or columns ex_{letter}_um and so on"
+        f" {UM_PER_MM * best_rms:.3g} µm: the result is likely wrong; expected the {other}"
+        f" frame, or columns ex_{letter}_um and so on"
     )
     return (note,)

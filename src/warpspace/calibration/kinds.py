@@ -189,12 +189,12 @@ class Points(FreePlacementKind):
             loop != "tool" or scene.machine.branch("workpiece")
         ):
             raise table.refuse(
-                f"has column {columns[0]}; expected errors of field --loop relative without"
-                " reference (with --placed: --kind tracker)"
+                f"has column {columns[0]}; expected errors in the relative loop without"
+                " reference (with placement: kind tracker)"
             )
         if frame and table.frame and frame != table.frame:
             problem = f"has column {columns[0]}, so its vectors are in the {frame} frame"
-            raise table.refuse(f"{problem}; expected no --frame {table.frame}")
+            raise table.refuse(f"{problem}; expected no other frame")
         is_assumed = not (frame or table.frame)
         coordinates, notes = axis_columns(table, scene)
         frame = frame or table.frame or "workpiece"

@@ -143,7 +143,7 @@ def _parse_field(text: str, source: str) -> ReadingTable:
         }
         errors = np.array([point["error_um"] for point in points], float).reshape(len(points), 3)
     except (ValueError, TypeError, LookupError, ArithmeticError, RecursionError):
-        expected = "a CSV table of readings, or the output of `field --loop relative --json`"
+        expected = "a CSV table of readings, or the JSON output of `field` in the relative loop"
         raise SceneError(source, [f"cannot be read; expected {expected}"]) from None
     if len(points) > MAX_READINGS or not all(
         map(np.all, map(np.isfinite, (*columns.values(), errors)))

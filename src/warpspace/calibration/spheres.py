@@ -73,7 +73,7 @@ class SphereTcp(Centres):
         observed = table.require(READ)
         rotary = rotary_axes(scene)
         coordinates, notes = axis_columns(table, scene, rotary, rotary)
-        hint = "Were they measured with TCP correction off (--kind sphere), or in another unit?"
+        hint = "Were they measured with TCP correction off (kind sphere), or in another unit?"
         check_spread(spread_mm(table), TCP_SPREAD_MM, table.source, hint)
         coordinates = solve_linear(scene, coordinates, mean_centres(observed, table), table.source)
         return build_readings(self.name, scene, table, coordinates, observed, notes)

@@ -99,7 +99,7 @@ def guarded(command: click.Command) -> click.Command:
             check_files(click.get_current_context())
             try:
                 return run(**values)
-            except OptionError as error:
+            except (OptionError, SceneError) as error:
                 raise OptionError(error.with_names(flag_of)) from None
 
         command.callback = check_and_run
@@ -108,8 +108,9 @@ def guarded(command: click.Command) -> click.Command:
 
 def flag_of(name: str) -> str:
     """Return the flag of an option of the running command."""
-    params = click.get_current_context().command.params
-    return {param.name: param.opts[0] for param in params}.get(name, name)
+    flags = {param.name: param.opts[0] for param in click.get_current_context().command.params}
+    flags |= {flag.lstrip("-").replace("-", "_"): flag for flag in flags.values()}
+    return flags.get(name, name)
 
 
 class Commands(MutableMapping[str, click.Command]):

@@ -59,7 +59,7 @@ class ReadOptions:
         if self.machine is not None:
             matches = [axis for axis in candidates if axis in self.machine.axes]
         if not matches:
-            advice = f"--axis {bare or 'NAME'}=AXIS assigns it"
+            advice = f"{{axis}} {bare or 'NAME'}=AXIS assigns it"
             if self.machine is None:
                 at.refuse(f"axis {bare!r} is unknown", f"X Y Z U V W A B C; {advice}")
             chain, axes = self.machine.chain, ", ".join(self.machine.axes)
@@ -154,7 +154,7 @@ def parse_axis_options(texts: Sequence[str]) -> tuple[str, dict[str, str]]:
         name, equals, target = text.partition("=")
         axis_name = (target if equals else name).strip().upper()
         if not is_axis_name(axis_name):
-            raise OptionError(f"--axis {text!r}; expected an axis (X) or NAME=AXIS (AX1=X)")
+            raise OptionError(f"{{axis}} {text!r}; expected an axis (X) or NAME=AXIS (AX1=X)")
         if equals:
             names[name.strip().upper()] = axis_name
         else:
@@ -200,8 +200,7 @@ def recognise(sources: Sequence[Source]) -> Format:
             _refuse_unpublished(name, head=head)
             _refuse_ending(name)
             names = ", ".join(kind.name for kind in formats())
-            hint = "(--format NAME selects it; `warpspace import --formats` lists their contents)"
-            expected = f"one of {names} {hint}"
+            expected = f"one of {names} ({{format}} selects it)"
             for at, _ in source.scan():
                 at.refuse(f"{at.quoted} matches no known format", expected)
             source.refuse("nothing matches no known format", expected)
@@ -231,7 +230,7 @@ def _refuse_unpublished(name: str, content: bytes = b"", head: str = "") -> None
 
 
 def _alternative(kind: Mapping[str, str]) -> str:
-    template = "enter position and error in the table of `warpspace import --template AXIS`"
+    template = "enter position and error in a CSV table, see {template}"
     return f"expected another file: {kind.get('instead', template)}"
 
 
@@ -265,8 +264,8 @@ def read_errors(sources: Sequence[Source], options: ReadOptions, format_name: st
     if options.variant not in ("", *kind.variants) and not kind.names_variants:
         variants = ", ".join(kind.variants) or "none"
         raise OptionError(
-            f"--variant {options.variant!r} of {kind.name}; expected one of: {variants}"
+            f"{{variant}} {options.variant!r} of {kind.name}; expected one of: {variants}"
         )
     if options.sign and kind.tables is None:
-        raise OptionError(f"--sign: {kind.name} contains errors, not a table of a controller")
+        raise OptionError(f"{{sign}}: {kind.name} contains errors, not a table of a controller")
     return Reading(kind.errors(sources, options), kind, not format_name)

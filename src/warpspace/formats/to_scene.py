@@ -58,7 +58,7 @@ def default_scene(imported: ImportedErrors) -> Scene:
     other = [axis for axis in imported.axes if axis not in ("X", "Y", "Z")]
     if other:
         raise OptionError(
-            f"the errors are of {', '.join(imported.axes)}; expected --machine: the files do not"
+            f"the errors are of {', '.join(imported.axes)}; expected {{machine}}: the files do not"
             f" state the position of {other[0]} in the machine"
         )
     spans = {axis: ends for axis, ends in _ranges(imported).items() if ends[1] - ends[0] > MIN_SPAN}

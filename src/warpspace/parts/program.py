@@ -366,11 +366,11 @@ class ProgramResult(Result):
             yield f"Dialect: {self.program.signs or self.program.dialect}"
         if self.program.skipped:
             words = [f"{words} (line {line})" for words, line in self.program.skipped.items()]
-            yield f"Ignored because of --skip: {', '.join(words[:MAX_LISTED])}"
+            yield f"Ignored as requested: {', '.join(words[:MAX_LISTED])}"
         if self.program.integer_word:
             word, line = self.program.integer_word
             numbers = "Numbers without a decimal point are mm or degrees"
-            yield f"{numbers}: {word} (line {line}); --least-increment for other units"
+            yield f"{numbers}: {word} (line {line}); unless a least increment is given"
 
     def caveats(self) -> Iterator[str]:
         program = self.program
@@ -382,9 +382,9 @@ class ProgramResult(Result):
         if remarks:
             yield f"remarks: {', '.join(remarks[:MAX_LISTED])}"
         if program.unused:
-            yield f"unused: --offset {', '.join(program.unused)}"
+            yield f"unused offsets: {', '.join(program.unused)}"
         if program.signs and not program.dialect:
-            yield f"words of several dialects: {program.signs}; --dialect selects one"
+            yield f"words of several dialects: {program.signs}; select the dialect"
         if self.outside:
             yield f"{self.outside} of {len(self.path.line)} points are beyond the travel"
 

@@ -159,7 +159,7 @@ def test_laser_runs_in_one_direction_and_in_both(unidirectional):
 
 def test_laser_runs_without_an_axis_ask_for_it():
     text = laser_runs(axis="Location:lab")
-    with pytest.raises(SceneError, match="does not state its axis; expected --axis X"):
+    with pytest.raises(SceneError, match="does not state its axis; expected axis X"):
         read(text, "x.rtl")
     assert read(text, "x.rtl", axis="Y").keys == ("EYY",)
 

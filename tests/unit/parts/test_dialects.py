@@ -132,7 +132,7 @@ def test_shifts_of_the_programs_of_controls():
     [
         ("G0 X1 Y1 Z1", {"offset": (("H1", 5.0), ("G54X", 1.0), ("G55X", 1.0))}, "H1, G55X"),
         ("G0 X1. Y1. Z1. H4", {}, "H4 without G43 (line 1)"),
-        ("G0 X50000 Y1. Z1.", {}, "X50000 (line 1); --least-increment"),
+        ("G0 X50000 Y1. Z1.", {}, "X50000 (line 1); unless a least increment"),
         ("%\nG0 X1. Y1. Z1.\nG91.1\nSUPA", {}, "linuxcnc (line 3, G91.1), sinumerik"),
         ("G0 X1. Y1. Z1.\nG73 Z0 R1. Q.5", {}, "G73 without the retraction"),
     ],
@@ -174,7 +174,7 @@ def test_the_command_line_reads_dialect_and_words_to_skip(tmp_path: Path):
     arguments = ["program", MILL, str(tmp_path / "a.nc")]
     skip = ["--skip", "TRANS,M777", "--dialect", "sinumerik"]
     text = CliRunner().invoke(cli, [*arguments, *skip]).output
-    assert "Ignored because of --skip: TRANS X100 Y50 (line 4)" in text
+    assert "Ignored as requested: TRANS X100 Y50 (line 4)" in text
     assert "3 blocks, 20.0 mm" in text
     assert (
         "is not one of 'auto', 'fanuc'"

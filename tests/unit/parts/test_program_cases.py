@@ -490,16 +490,16 @@ def test_the_whole_program_is_executed(text: str, length: float, options: dict[s
         (SHIFTED, 0, (4, "G1", "expected X, Y before"), {"offset": (("G54Z", -400.0),)}),
         # words of Fanuc that bend the path; mirror without a dialect; a turned work offset
         (CORNERS, 0, (3, "G7.1", "expected a word that is executed"), {}),
-        (MIRRORED, 10, (4, "G101", "--dialect haas"), {}),
+        (MIRRORED, 10, (4, "G101", "dialect haas"), {}),
         (WORK_OFFSET, 20, (9, "B30", "G254 cancelled before"), {"scene": BC, **H1}),
         # repetitions or the least peck
-        (PECKS.format("K0.2"), 0, (3, "K0.2", "--dialect haas"), {}),
-        (PECKS.format("K3."), 0, (3, "K3", "--dialect haas"), {}),
+        (PECKS.format("K0.2"), 0, (3, "K0.2", "dialect haas"), {}),
+        (PECKS.format("K3."), 0, (3, "K3", "dialect haas"), {}),
         # a corner next to an arc
         (block("G17", "G54X0Y0", "G01X10.Y10.,R20.", "G02X40.Y15.R20.,R0.5", "G01Y20.", "X50.,R2.",
                "X50.Y0", "M02"), 10 * sqrt(2), (4, ",R0.5", "no ,R with G2"), {}),
         # an unknown wear
-        (WEAR, 95 + 23 + 2.5, (11, "G41", "--offset D1=0"), {}),
+        (WEAR, 95 + 23 + 2.5, (11, "G41", "the offset D1=0"), {}),
         # a plane without rotary axes, and with X and Y that are not programmed in it
         (SWIVELLED, 0, (7, "CYCLE800", "two rotary axes"), {}),
         (SWIVELLED, 0, (8, "G1", "expected X before"), {"scene": AC}),

@@ -216,7 +216,7 @@ def with_equal_tolerances(scenes: Sequence[Scene], *, own_tolerances: bool) -> t
     if missing:
         problem = (
             f"tolerances.default has no {', '.join(missing)}; expected a half width for each class,"
-            " which all machines then have (--own-tolerances takes those of each scene)"
+            " which all machines then have ({own_tolerances} takes those of each scene)"
         )
         raise SceneError(scenes[0].name, [problem])
     equal = ToleranceSet(dict(default))

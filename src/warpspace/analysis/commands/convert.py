@@ -140,7 +140,7 @@ class ConvertResult(Result):
         listed = list(self.changed.items())[:MAX_SHOWN]
         yield Table(columns, [(key, parameter(key).unit, a, b) for key, (a, b) in listed])
         if count > MAX_SHOWN:
-            yield f"  and {count - MAX_SHOWN} more; --json lists them all"
+            yield f"  and {count - MAX_SHOWN} more, all in the JSON output"
         yield from (f"  {note}" for note in self.notes)
         yield (
             f"  exact fields differ by at most {self.largest_um:.1e} µm and"
@@ -266,5 +266,5 @@ def _choose_axes(scene: Scene, text: str, value: object, kinds: str) -> dict[str
     }
     if text not in groups and text not in axes:
         expected = ", ".join((*axes, *groups))
-        raise OptionError(f"--to {text!r}: no such axis; expected one of {expected}")
+        raise OptionError(f"{{to}} {text!r}: no such axis; expected one of {expected}")
     return dict.fromkeys(groups.get(text, [text]), value)

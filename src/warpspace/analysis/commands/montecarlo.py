@@ -128,7 +128,7 @@ class MonteCarlo(SampledMachines):
         Reduction.SAMPLED,
         "|E| at one random point per machine, or its largest or mean over a machine's points",
     )
-    grid: int = option(DEFAULT_NODES, "Nodes per axis for --over max|mean", low=2, high=101)
+    grid: int = option(DEFAULT_NODES, "Nodes per axis for the largest or mean |E|", low=2, high=101)
     limit_um: float | None = option(
         None,
         "Limit of |E|, for the share of machines within it",
@@ -141,9 +141,7 @@ class MonteCarlo(SampledMachines):
         "Half widths of a parameter, or of the class translation, rotation or squareness, in µm or"
         " µrad: N of them in equal steps, or a list as in EXX=5,10,20",
     )
-    rows: bool = option(
-        False, "A row for each scene, as --tolerance gives for each combination of half widths"
-    )
+    rows: bool = option(False, "A row for each scene, as for each combination of half widths")
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "MonteCarloResult":
         return self.run_all((scene,), watch)

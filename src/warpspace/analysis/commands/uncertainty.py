@@ -171,7 +171,7 @@ class UncertaintyResult(Result):
         if self.significant_percent is not None:
             yield f"  |E| is above its own U95 in {self.significant_percent:.1f} % of the volume"
             if self.significant_percent < MOSTLY:
-                yield "  below it the first order does not suffice: --verify adds Monte Carlo"
+                yield "  below it the first order does not suffice: verify by Monte Carlo"
         if self.never_measured_percent:
             yield f"  {self.never_measured_percent:.1f} % of the volume was never measured"
         numbers = Column("u", ".3g"), *number_columns(("of max", "of mean"), ".1f", "%")

@@ -112,7 +112,7 @@ def refuse_many_points(loop: Loop) -> None:
     if loop is Loop.WORKPIECE:
         raise OptionError(
             "the worst point of the workpiece loop lies among all turns of the table: ask for one"
-            " random point per machine ({over} sampled), or use the command montecarlo --over max"
+            " random point per machine ({over} sampled), or sample machines with {over} max"
         )
 
 

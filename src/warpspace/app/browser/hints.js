@@ -12,7 +12,7 @@
     root.classList.remove("ws-hints");
     if (focused) document.querySelector("#ws-find")?.focus({ preventScroll: true });
   };
-  addEventListener("keydown", event => { if (event.key === "Escape") hide(); });
+  addEventListener("keydown", event => { if (event.key === "Escape") hide(); }, true);
   addEventListener("click", event => { if (event.target.closest?.(".ws-hint button, [role=tab]")) hide(); });
   addEventListener("input", event => { if (event.target.closest?.("#ws-left, .ws-foot")) hide(); });
 

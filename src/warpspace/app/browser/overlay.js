@@ -2,7 +2,7 @@
 // numbers and names of the axes, the triad. They follow the camera, which is never moved here.
 (() => {
   if (window.warpspaceOverlay) return;
-  const MOST_LABELS = 12, LABEL_APART = 52, BAR_PX = 130, BAR_PART = 0.22;
+  const MOST_LABELS = 12, LABEL_APART = 52;
   const SETTLED_MS = 160, LEAST_FACING = 0.12, PLATE_MS = 250;
   const state = { labels: [], slices: [], axes: [], marks: [], corners: [], triad: [], stale: [],
     centre: [0, 0, 0], factor: 1, perMm: 0.01 };
@@ -12,36 +12,11 @@
   const part = name => root.querySelector(`.ws-${name}`);
   const zoom = () => root.currentCSSZoom ?? 1;
 
-  const roundDown = value => {
-    const decade = 10 ** Math.floor(Math.log10(value));
-    return Math.max(...[1, 2, 5].map(s => s * decade).filter(v => v <= value * (1 + 1e-9)), decade);
-  };
-  const spell = value => String(Number(value.toPrecision(6)));
-
-  // column-major 4 × 4 times a point
-  const through = (m, [x, y, z]) => [0, 1, 2, 3].map(
-    i => m[i] * x + m[4 + i] * y + m[8 + i] * z + m[12 + i]);
-
-  // position of a point on the screen: pixels from the top left of the drawing, and depth
-  const project = (camera, world, rect, point) => {
-    const eye = through(camera.matrixWorldInverse.elements, through(world, point));
-    const clip = through(camera.projectionMatrix.elements, eye);
-    return { x: (clip[0] / clip[3] + 1) / 2 * rect.width,
-      y: (1 - clip[1] / clip[3]) / 2 * rect.height, depth: -eye[2] };
-  };
+  const { through, project } = warpspaceBars;
 
   const drawBars = (camera, world, rect) => {
-    const bars = part("bars");
-    const depth = project(camera, world, rect, state.centre).depth;
-    const perMm = camera.projectionMatrix.elements[5] * rect.height / 2 / depth * state.perMm;
-    const free = Math.min(Math.max(BAR_PX, 0.09 * rect.width), BAR_PART * rect.width);
-    if (!state.bars || !(depth > 0) || !(perMm > 0)) { bars.replaceChildren(); return; }
-    const mm = roundDown(free / perMm), perUm = perMm * 1e-3 * state.factor;
-    const um = roundDown(free / perUm);
-    const rows = [["mm", mm, mm * perMm, `${spell(mm)} mm geometry`], ["um", um, um * perUm,
-      `${um < 1e4 ? `${spell(um)} µm` : `${spell(um * 1e-3)} mm`} error, drawn ${state.spelt}`]];
-    bars.innerHTML = rows.map(([name, length, width, text]) => `<div data-bar-scale="${name}"
-      data-length="${length}"><i style="width:${width.toFixed(2)}px"></i>${text}</div>`).join("");
+    const html = state.bars ? warpspaceBars.html(camera, world, rect, state) : "";
+    if (part("bars").innerHTML !== html) part("bars").innerHTML = html;
   };
 
   // true if a slice hides the point

@@ -30,7 +30,8 @@
       <div data-piece="tasks"></div></aside>
     <aside id="ws-notes" aria-label="Notes" data-piece="notes"></aside>
     <dialog id="ws-window" aria-labelledby="ws-window-title" data-piece="window"></dialog>
-    <div id="ws-toasts" role="status" aria-live="polite" popover="manual"></div>`;
+    <div id="ws-toasts" role="status" aria-live="polite" popover="manual"></div>
+    <div id="ws-drop" hidden></div>`;
 
   // --- HTML: only differences are applied, so that focus and typed text are preserved --------------
   const keyOf = node => node.nodeType === 1 ? node.id || node.dataset.key || node.dataset.piece || "" : "";
@@ -231,8 +232,17 @@
   const closeMenus = but => shell.querySelectorAll("details:is(.ws-menu, .ws-pop)[open]").forEach(menu => {
     if (menu !== but) menu.open = false;
   });
+  const shift = document.head.appendChild(document.createElement("style"));
+  shell.addEventListener("toggle", event => {  // an open menu stays within the drawing
+    const sheet = event.target.open && event.target.querySelector(":scope > .ws-sheet");
+    if (!sheet) return;
+    shift.textContent = "";
+    const at = sheet.getBoundingClientRect(), room = shell.querySelector("#ws-over").getBoundingClientRect();
+    const beyond = Math.min(at.right - room.right + 8, at.left - room.left) / (shell.currentCSSZoom ?? 1);
+    if (beyond > 0) shift.textContent = `.ws-pop[open] > .ws-sheet { translate: ${-beyond}px 0; }`;
+  }, true);
   addEventListener("pointerdown", event => closeMenus(event.target.closest?.("details:is(.ws-menu, .ws-pop)")), true);
-  addEventListener("keydown", event => {
+  shell.addEventListener("keydown", event => {
     const menu = event.key === "Escape" && event.target.closest?.("details:is(.ws-menu, .ws-pop)[open]");
     if (menu) { menu.open = false; menu.querySelector("summary").focus(); }
   });
@@ -293,6 +303,8 @@
     items[items.indexOf(node) + step]?.focus();
     event.preventDefault();
   });
+  // the camera, which listens on the document, moves only while no control has the focus
+  shell.addEventListener("keydown", event => event.stopPropagation());
   document.addEventListener("cancel", event => {
     if (event.target.id === "ws-window") { event.preventDefault(); closeWindow(); }
   }, true);
@@ -315,11 +327,31 @@
     input.click();
   };
   const hasFiles = event => [...(event.dataTransfer?.types ?? [])].includes("Files");
-  addEventListener("dragover", event => { if (hasFiles(event)) event.preventDefault(); });
-  addEventListener("drop", event => {
+  const rowsAt = event => event.target.closest?.("textarea.ws-rows-box");
+  // outline of the place where the files go: the numbers of a curve, otherwise the whole drawing
+  let dropTimer = 0;
+  const showDrop = target => {
+    const mark = shell.querySelector("#ws-drop"), zoom = shell.currentCSSZoom ?? 1;
+    clearTimeout(dropTimer);
+    mark.hidden = !target;
+    if (!target) return;
+    mark.textContent = target.tagName === "TEXTAREA" ? "Drop: numbers of this curve" : "Drop to open";
+    const { x, y, width, height } = target.getBoundingClientRect();
+    Object.assign(mark.style, { left: `${x / zoom}px`, top: `${y / zoom}px`, width: `${width / zoom}px`,
+      height: `${height / zoom}px` });
+    dropTimer = setTimeout(showDrop, 1000);  // the browser repeats dragover; without it the files have left
+  };
+  addEventListener("dragover", event => {
     if (!hasFiles(event)) return;
     event.preventDefault();
-    const numbers = event.target.closest?.("textarea.ws-rows-box");
+    showDrop(rowsAt(event) ?? shell.querySelector("#ws-over"));
+  });
+  addEventListener("dragleave", event => { if (!event.relatedTarget) showDrop(); });
+  addEventListener("drop", event => {
+    showDrop();
+    if (!hasFiles(event)) return;
+    event.preventDefault();
+    const numbers = rowsAt(event);
     if (numbers) {
       event.dataTransfer.files[0].text().then(text => {
         numbers.value = text;
@@ -336,8 +368,11 @@
     if (!shelf.isConnected || !shelf.showPopover) return;
     if (shelf.matches(":popover-open")) shelf.hidePopover();
     if (shelf.childElementCount) shelf.showPopover();
+    shelf.scrollTop = shelf.scrollHeight;
   };
-  // --- messages that disappear by themselves -------------------------------------------------------
+  // --- messages that disappear by themselves; the columns end above them ---------------------------
+  new ResizeObserver(([{ target }]) => shell.style.setProperty("--ws-said", `${target.offsetHeight}px`))
+    .observe(shell.querySelector("#ws-toasts"));
   const toast = (kind, title, text = "") => {
     const box = document.createElement("section");
     box.className = `ws-toast ws-${kind}`;
@@ -345,12 +380,13 @@
     if (text) box.append(Object.assign(document.createElement("p"), { textContent: text }));
     const close = Object.assign(document.createElement("button"), { textContent: "✕" });
     close.setAttribute("aria-label", "Close this message");
-    close.onclick = () => box.remove();
+    const leave = () => { box.remove(); raiseToasts(); };
+    close.onclick = leave;
     box.append(close);
     const shelf = shell.querySelector("#ws-toasts");
     shelf.append(box);
     raiseToasts();
-    if (kind !== "stays") setTimeout(() => box.remove(), TOAST_MS);
+    if (kind !== "stays") setTimeout(leave, TOAST_MS);
   };
   const copyText = async (text, title = "Copied", words = "") => {
     try { await navigator.clipboard.writeText(text); toast("done", title, words); }
@@ -431,6 +467,18 @@
     keys(actions) { known.keys = actions; },
     // scroll to a note, after the list is opened
     reveal(id) { setTimeout(() => document.getElementById(id)?.focus(), 300); },
+    // rejected: these controls show their present values again
+    settle(actions) {
+      const control = text => text.startsWith("{") ? JSON.stringify({ ...JSON.parse(text), value: 0 }) : text;
+      const names = actions.map(control);
+      for (const node of shell.querySelectorAll("[data-set]")) {
+        if (!names.includes(control(node.dataset.set)) || typing(node) || node.dataset.held) continue;
+        const options = [...node.options ?? []];
+        node.checked = node.defaultChecked;
+        node.value = options.length ? (options.find(one => one.defaultSelected) ?? options[0]).value
+          : node.type === "radio" || node.type === "checkbox" ? node.value : node.defaultValue;
+      }
+    },
     show(pieces) { for (const [name, html] of Object.entries(pieces)) write(name, html); },
     menu(name) {
       const menu = document.querySelector(`[data-key="menu-${name}"]`);

@@ -12,7 +12,7 @@ from viser import ClientHandle, ViserServer
 from warpspace.app.browser.viser_private import send_at_once, send_script
 from warpspace.exceptions import WarpspaceError
 
-SCRIPTS = ("viser_private", "page", "overlay", "mesh", "fly", "server", "hints", "story",
+SCRIPTS = ("viser_private", "page", "bars", "overlay", "mesh", "fly", "server", "hints", "story",
            "together", "pictograms")  # fmt: skip
 
 

@@ -63,6 +63,12 @@ def serve_with(change: Callable[[dict[str, Any]], dict[str, Any]]) -> Generator[
             library.serve = original
 
 
+BARE_STYLE = """<style>
+  #root button, [data-portal], .mantine-Notifications-root { display: none !important; }
+</style>"""
+"""Hides button and messages of an exported page; an option of `as_html` would replace this."""
+
+
 def message_buffer(client: ClientHandle) -> Any:
     return _connection(client).get_message_buffer()
 

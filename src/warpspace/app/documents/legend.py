@@ -90,7 +90,7 @@ def marked(picture: LivePicture) -> dict[str, float]:
         field = field.tilts
     norm = field.norm_um
     marks = {"mean": volume_mean(norm, picture.grid), "P95": share_within(field, P95),
-             "max": float(norm.max())}  # fmt: skip
+             "max": float(norm.max())} if norm.any() else {}  # fmt: skip
     limit = picture.state.specification.limit_um
     if limit is not None and not picture.tilts and not picture.is_difference:
         marks["limit"] = limit
@@ -220,6 +220,8 @@ def place_words(picture: LivePicture) -> str:
         name = trace_label(picture, line)
         angle = f"{line.trace.axis} {number(at_deg, 0)}°"
         return f"at {angle} of {name} · {', '.join(points)}"
+    if not picture.field.norm_um.any():
+        return ""
     node = np.unravel_index(int(np.argmax(picture.field.norm_um)), picture.shape)
     positions = picture.grid.coordinates.items()
     at = {name: float(np.broadcast_to(values, picture.shape)[node]) for name, values in positions}

@@ -9,7 +9,8 @@
   const frame = document.querySelector("iframe"), said = [...document.querySelectorAll("[data-step]")];
   const back = document.getElementById("back"), on = document.getElementById("on");
   const from = start && new Float32Array(bytes(start).buffer);  // one step alone is drawn already
-  let at = 0, timer = 0;
+  const bars = document.querySelector(".ws-bars");
+  let at = 0, timer = 0, moves = Infinity, touched = false, looks = "";
 
   // what a camera sees from side to side is seen in a narrow window, too
   const fitted = ({ position, look_at, ...more }) => {
@@ -22,6 +23,8 @@
     const { camera, point, shifts, levels, palette } = steps[at];
     const wait = () => { timer = setTimeout(draw, 100, long); };  // the drawing is not there yet
     if (!viser?.node("/box/surface") || !fly(fitted(camera), long)) { wait(); return; }
+    moves = performance.now() + long + 100;  // until then the camera is on its way
+    touched = false;
     if (frame.clientWidth < NARROW)
       for (const name of viser.nodeNames()) if (name.startsWith("/words/tick")) mesh.move(name, [0, 0, 1e4]);
     if (!from) return;
@@ -29,6 +32,27 @@
     mesh.open({ count, lines, palette });
     mesh.glide = long;
     if (!mesh.bend(from.map((x, i) => x + unit * shifts[i]), levels)) wait();
+  };
+  // viser sets its own camera and the direction upwards when they arrive, perhaps after ours: until
+  // the reader moves the camera it is put where it belongs, also in a window of another size
+  const isAway = (fly, viser) => {
+    const { position, up } = fitted(steps[at].camera), camera = viser.camera();
+    const far = Math.hypot(...position), off = (a, b) => Math.hypot(...a.map((x, i) => x - b[i]));
+    return off(fly.out(position), camera.position.toArray()) > 1e-3 * far
+      || off(fly.out(up), camera.up.toArray()) > 1e-3;
+  };
+  const follow = () => {
+    requestAnimationFrame(follow);
+    const { warpspaceFly: fly, warpspaceBars, warpspaceViser: viser } = frame.contentWindow;
+    const world = viser?.world(), camera = viser?.camera();
+    if (!world || !camera || performance.now() < moves) return;
+    if (!touched && isAway(fly, viser)) fly(fitted(steps[at].camera), 0);
+    const facts = steps[at].bars, size = { width: frame.clientWidth, height: frame.clientHeight };
+    const seen = [at, size.width, size.height, ...camera.matrixWorld.elements,
+      ...camera.projectionMatrix.elements].join();
+    if (seen === looks) return;
+    looks = seen;
+    bars.innerHTML = facts ? warpspaceBars.html(camera, world, size, facts) : "";
   };
   const go = to => {
     at = to;
@@ -45,7 +69,11 @@
     event.stopImmediatePropagation();
     go(at + way);
   };
-  const listen = () => frame.contentWindow.addEventListener("keydown", key, true);
+  const listen = () => {
+    frame.contentWindow.addEventListener("keydown", key, true);
+    for (const type of ["pointerdown", "wheel", "keydown"])
+      frame.contentWindow.addEventListener(type, () => { touched = true; }, true);
+  };
   addEventListener("keydown", key, true);
   frame.addEventListener("load", listen);
   listen();
@@ -53,4 +81,5 @@
   on.onclick = () => go(at + 1);
   setInterval(() => frame.contentWindow.warpspaceMesh?.holdBack(document.documentElement.className), 250);
   draw(0);
+  follow();
 })();

@@ -24,6 +24,7 @@ from markupsafe import Markup, escape
 from warpspace.analysis.note_tables import note_numbers, spell_numbers, spell_place, stale_remark
 from warpspace.app.browser.html import EMPTY, join, linked, lowered, number, rows, tag
 from warpspace.app.browser.page import script_source
+from warpspace.app.browser.viser_private import BARE_STYLE
 from warpspace.app.documents import legend
 from warpspace.app.documents.scene_file import KnownScenes, reopened
 from warpspace.app.drawing.around import ACCENT, POINT_MARKER, draw_labels, draw_surroundings
@@ -39,6 +40,7 @@ from warpspace.app.state.app_state import AppState, start_state
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.field.grid import MIN_NODES
 from warpspace.machine.axes import parameter
+from warpspace.picture.formatting import spell_factor
 from warpspace.picture.map_mesh import map_mesh
 from warpspace.picture.model import choose_scale
 from warpspace.resources import __version__
@@ -183,7 +185,7 @@ def _story_view(step_state: AppState, like: AppState, *notes: Note) -> AppState:
 
 def _packed_steps(steps: Sequence[PageStep]) -> str:
     """Pack the drawings of the steps; points as integer shifts from those of the first."""
-    first, step_views = steps[0].picture, [{"camera": asdict(step.camera)} for step in steps]
+    first, step_views = steps[0].picture, [_view_facts(step) for step in steps]
     content: dict[str, object] = {"steps": step_views}
     if len(steps) > 1:
         start, unit = map_mesh(first).vertices_mm, first.size_mm / PARTS
@@ -200,14 +202,22 @@ def _packed_steps(steps: Sequence[PageStep]) -> str:
     return b64encode(zlib.compress(text, 9)).decode("ascii")
 
 
+def _view_facts(step: PageStep) -> dict[str, object]:
+    picture = step.picture
+    centre = (picture.grid.bounds_mm.mean(axis=0) * SCENE_PER_MM).round(4).tolist()
+    bars = {"centre": centre, "perMm": SCENE_PER_MM, "factor": picture.exaggeration,
+            "spelt": spell_factor(picture.exaggeration)}  # fmt: skip
+    return {"camera": asdict(step.camera), "bars": bars if picture.state.look.bars else None}
+
+
 # --- The page around the drawing ------------------------------------------------------------------
 
 
 def _build_page(title: str, steps: Sequence[PageStep], shapes: Shapes, about: About) -> str:
     texts = files("warpspace.app.documents")
-    names = "viser_private.js", "mesh.js", "fly.js"
-    scripts = "".join(f"<script>{script_source(name)}</script>" for name in names)
-    scene = _export(steps[0], shapes).replace("</body>", f"{scripts}</body>")
+    names = "viser_private.js", "mesh.js", "fly.js", "bars.js"
+    added = BARE_STYLE + "".join(f"<script>{script_source(name)}</script>" for name in names)
+    scene = _export(steps[0], shapes).replace("</body>", f"{added}</body>")
     remarks = ("drag to turn, wheel to zoom", f"warpspace {__version__}")
     if steps[0].note:
         remarks = (LEFT_OUT, "→ next step, ← previous step", *remarks)

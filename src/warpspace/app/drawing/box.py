@@ -34,6 +34,7 @@ DASH, GAP = 0.022, 0.014
 """Dash and gap of the nominal box, relative to its longest edge."""
 LIMIT_NODES = ("/limit/line", "/limit/hatching")
 LIMIT: Rgb = (179, 38, 30)  # as the mark of the colour bar
+COINCIDENT = 1e-3  # largest displacement, likewise relative, at which the boxes coincide
 ISOLINES: tuple[Rgb, Rgb] = ((226, 230, 236), (60, 68, 80))
 """Contrast with all colours of a sequential scale, and of a diverging one."""
 
@@ -87,7 +88,7 @@ def box(picture: LivePicture) -> Shapes:
         if look.isolines or look.pass_fail:
             rgb = ISOLINES[picture.scale.diverging]
             shapes["/box/isolines"] = lines(map_mesh.isoline_pieces(picture), rgb, 1.4)
-    if options.ghost:
+    if _has_ghost(picture):
         shapes["/ghost"] = lines(ghost_dashes(picture), colour(picture, "ghost"), 1.5)
     return shapes
 
@@ -100,6 +101,12 @@ def limit_shapes(picture: LivePicture) -> Shapes:
     line, hatching = map_mesh.limit_pieces(picture, limit)
     drawn = lines(line, LIMIT, 2.6), lines(hatching, LIMIT, 1.0)
     return dict(zip(LIMIT_NODES, drawn, strict=True))
+
+
+def _has_ghost(picture: LivePicture) -> bool:
+    """Check if the nominal box is drawn: not where it coincides with the actual one."""
+    shift_mm = float(np.abs(picture.drawn_mm - picture.grid.nominal_mm).max())
+    return picture.state.shown.ghost and shift_mm > COINCIDENT * picture.size_mm
 
 
 class BoxLayer:
@@ -150,6 +157,7 @@ def only_bent(drawn: LivePicture, picture: LivePicture) -> bool:
         and picture.compared is None and drawn.compared is None
         and picture.grid.nominal_mm is drawn.grid.nominal_mm
         and after.look == before.look and after.shown == before.shown
+        and _has_ghost(drawn) is _has_ghost(picture)
         and not after.look.isolines and not after.look.pass_fail and picture.faded is None
         and after.look.surface in ("surface", "cut") and not picture.is_rotary
     )  # fmt: skip

@@ -42,7 +42,7 @@ from warpspace.app.panels.panel import (
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import LONGEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
-from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.exceptions import WarpspaceError
 from warpspace.field.grid import DEFAULT_NODES
 from warpspace.machine.axes import parameter
 from warpspace.picture.formatting import spell_at
@@ -341,9 +341,9 @@ class AnalysisPanel(Section):
 
     def _fail(self, error: Exception) -> None:
         text = error_words(error)
-        if isinstance(error, OptionError):
-            labels = {option.name: option.label for option in self.kind.options()}
-            text = error.with_names(lambda name: labels.get(name, name))
+        if isinstance(error, WarpspaceError):
+            labels = {option.name: f"“{option.label}”" for option in self.kind.options()}
+            text = error.with_names(lambda name: labels.get(name, name.replace("_", " ")))
         self.problem = (self.last_key, text)
         self.rerender()
 

@@ -306,8 +306,8 @@ class CalibratePanel(FilesPanel):
                 omitted = f" and {len(keys) - MOST_NAMED} more" if len(keys) > MOST_NAMED else ""
                 names = ", ".join(keys[:MOST_NAMED])
                 parts.append(quiet(f"{title}: {names}{omitted}"))
-        notes = (note.replace("--", "") for note in result.notes[:MOST_NAMED])
-        return join((*parts, *(tag("p", note, class_="ws-caveat") for note in notes)))
+        notes = (tag("p", note, class_="ws-caveat") for note in result.notes[:MOST_NAMED])
+        return join((*parts, *notes))
 
     def result_html(self, result: Result) -> Markup:
         blocks = list(result.blocks())

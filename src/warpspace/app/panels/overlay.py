@@ -350,7 +350,7 @@ def _exaggeration(picture: LivePicture) -> Markup:
     chosen = "auto" if state.exaggeration is None else f"{state.exaggeration:g}"
     label = "true scale" if picture.exaggeration == 1.0 else spell_factor(picture.exaggeration)
     name = do.SetLeaf("exaggeration")
-    box = text_box(name, f"{picture.exaggeration:.4g}", size="short")
+    box = text_box(name, f"{picture.exaggeration:.7g}", size="short")
     picks = _picks(partial(do.SetLeaf, name.path), factors, chosen)
     body = field("Exaggeration ×", box, name) + picks
     return html.menu(label, body, key="exaggeration", label=f"Exaggeration: {label}", kind="up",

@@ -49,7 +49,6 @@ SIGNS = {
     "correction": "corrections (added by the controller)",
 }
 DIRECTIONS = {FORWARD: "forward", BACKWARD: "backward", UNDIRECTED: "mean"}
-OPTIONS = {"--axis": "“Axis”", "--sign": "“Sign”", "--variant": "“Variant”", "--format": "“Format”"}
 INTRODUCTION = (
     "Measured errors or compensation tables of a controller. Changes are previewed before they are"
     " applied. Files can also be dropped on the page."
@@ -120,7 +119,7 @@ class ImportResult(description.Result):
         errors, unchanged = self.reading.imported, f"kept from {self.before.name}:"
         for note in (*errors.assumed, *errors.notes, *self.imported.notes):
             if not note.startswith("replaced: "):
-                yield _without_options(note.replace(unchanged, "unchanged:"))
+                yield note.replace(unchanged, "unchanged:")
         n_hidden = len(errors.series) - MOST_CURVES
         if n_hidden > 0:
             yield f"{n_hidden} more curves are not displayed"
@@ -142,13 +141,6 @@ def _curves(series: ErrorSeries) -> Iterator[Curve]:
             yield curve(name, mean, direction, "line")
     if len(series.runs) > n_means:
         yield from (curve("", np.array(run.values), run.direction, "dots") for run in series.runs)
-
-
-def _without_options(text: str) -> str:
-    """Replace names of command options by labels of the page."""
-    for flag, label in OPTIONS.items():
-        text = text.replace(flag, label)
-    return text
 
 
 # --- The section ----------------------------------------------------------------------------------
@@ -249,9 +241,6 @@ class ImportPanel(FilesPanel):
     def _show(self, files: tuple[UploadedFile, ...], *, is_joined: bool) -> None:
         self.set_files(files)
         self.context.post(partial(_unfolded, keeps_forms=is_joined))
-
-    def problem_html(self, state: AppState) -> Markup:
-        return Markup(_without_options(super().problem_html(state)))  # noqa: S704 - escaped before
 
 
 def _recognised(files: Sequence[UploadedFile]) -> registry.Format | None:

@@ -385,7 +385,8 @@ class Session:
 
     def _follow(self) -> None:
         context = self.context
-        for action in [context.events.popleft() for _ in range(len(context.events))]:
+        actions = [context.events.popleft() for _ in range(len(context.events))]
+        for action in actions:
             self._handle_page_action(action)
             for panel in self.display.panels.values():
                 if panel.handles(action):
@@ -411,8 +412,11 @@ class Session:
                 if not self._revert(error, now, self._shown):
                     raise
                 self.run_guarded(partial(self._show, picture, picture, force=True))
-                return
+                state, now, notes = picture.state, self._shown, []
             self._shown = now
+        controls = [str(action) for action in actions if hasattr(action, "value")]
+        if controls and (notes or state is picture.state):
+            context.page.call("settle", controls)
         if notes:
             context.notify("Please note", "\n".join(notes), "warning")
 

@@ -63,6 +63,8 @@ def read_form(
             if number is None:
                 raise OptionError(f"{{{option.name}}} {text!r}; expected a number")
             arguments[option.name] = option.kind(number)
+        elif option.grammar is not None and option.grammar.each:
+            arguments[option.name] = tuple(option.read(word, scene) for word in text.split())
         else:
             arguments[option.name] = option.read(text, scene)
     return kind(**arguments)

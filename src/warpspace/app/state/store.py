@@ -248,13 +248,13 @@ class StateStore:
 
     def _push(self, state: AppState, at: float) -> None:
         document, before = self._document, self.state
-        seen = {name: getattr(state, name) for name in ("page", "forms", *VIEW)}
+        view = {name: getattr(state, name) for name in ("page", "forms", *VIEW)}
         if _equal(before.comparison, state.comparison):  # perhaps with another side drawn
-            seen["comparison"] = state.comparison
-        changed = changes(replace(before, **seen), state)
+            view["comparison"] = state.comparison
+        changed = changes(replace(before, **view), state)
         if not changed:
-            if any(getattr(before, name) != value for name, value in seen.items()):
-                document.state = replace(before, **seen)
+            if any(getattr(before, name) != value for name, value in view.items()):
+                document.state = replace(before, **view)
             return
         past = self.past
         is_same = past and not self.future and past[-1].changed == changed

@@ -141,9 +141,9 @@ class Circular(BenchTest):
         " the smallest radial deviation about the least-squares centre: G of one sense about its"
         " own, G(b) of both about the common one. Radial deviations Fmax and Fmin are as read,"
         " about the centre of the instrument. An ellipse at 45° is squareness, one along the axes"
-        " a difference of their scales, a step where an axis reverses its backlash. With --rotary"
-        " the linear axes follow a ball on a rotary axis, and the bar stands in the radial,"
-        " tangential or axial direction of its circle; these readings are evaluated as read."
+        " a difference of their scales, a step where an axis reverses its backlash. With a rotary"
+        " axis the linear axes follow a ball on it, and the bar stands in the radial, tangential or"
+        " axial direction of its circle; these readings are evaluated as read."
     )
     columns = (DIRECTION, ANGLE, DataColumn("radial_um"))
     plane: Literal["XY", "XZ", "YZ"] = option("XY", "Plane of the circle")
@@ -157,7 +157,7 @@ class Circular(BenchTest):
         "", "Rotary axis that the linear axes follow, in place of the circle in a plane"
     )
     bar: Literal["radial", "tangential", "axial"] = option(
-        "radial", "Direction of the bar, with --rotary"
+        "radial", "Direction of the bar, with a rotary axis"
     )
 
     def plan(self, scene: Scene) -> BenchPlan:

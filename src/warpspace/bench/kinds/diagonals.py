@@ -178,7 +178,7 @@ class Diagonals(BenchTest):
             if int(chosen.sum()) != each:
                 raise table.refuse(
                     f"diagonal {name}: {int(chosen.sum())} readings; expected {each}, the start and"
-                    f" {self.targets - 1} steps of each of three axes (--targets {self.targets})"
+                    f" {self.targets - 1} steps of each of three axes ({{targets}} {self.targets})"
                 )
             values.append(table["deviation_um"][chosen])
         return plan, np.concatenate(values)

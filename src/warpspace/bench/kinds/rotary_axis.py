@@ -205,8 +205,8 @@ class RTest(BenchTest):
     description = (
         "A ball stands on the table, three sensors on the tool (or the other way round) read its"
         " position along x, y and z. A rotary axis turns; the linear axes follow, so that"
-        " nominally the tool stays on the ball. Readings are tool minus ball, in R or, with"
-        " --frame workpiece, in directions that turn with the table. The range of each is the"
+        " nominally the tool stays on the ball. Readings are tool minus ball, in R or, in the"
+        " workpiece frame, in directions that turn with the table. The range of each is the"
         " quantity of the standard; the ranges after the ball's position is fitted (it is not"
         " known accurately) are reported too."
     )

@@ -208,7 +208,7 @@ class Squareness(BenchTest):
 
     def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         axes = placing.plane_axes(scene.machine, self.plane)
-        expected = f"{axes[0]} or {axes[1]} (--plane {self.plane})"
+        expected = f"{axes[0]} or {axes[1]} ({{plane}} {self.plane})"
         problems = table.unknown_labels("line", axes, expected)
         line_index = np.array([float(word == axes[1]) for word in table.labels["line"]])
         for index, axis in enumerate(axes):

@@ -26,7 +26,7 @@ from warpspace.formats.compensation.corrections import (
     RequiredCorrections,
     build_corrector,
 )
-from warpspace.formats.registry import SIGNS, Files, Format, find_format
+from warpspace.formats.registry import SIGNS, Files, Format, find_format, formats
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import TravelDirection
 from warpspace.scene.model import Scene, with_direction, with_placement
@@ -309,7 +309,8 @@ def compensate(
     kind, loop, sign = find_format(options.formats[0]), options.loop or "", options.sign or ""
     if kind.write is None:
         raise OptionError(
-            f"{kind.name} cannot be written; `warpspace import --formats` lists those that can"
+            f"{kind.name} cannot be written; expected one of"
+            f" {', '.join(kind.name for kind in formats() if kind.can_write)}"
         )
     if options.orientation and not kind.orientation:
         raise OptionError(f"{{orientation}}: {kind.name} corrects the position only")

@@ -220,7 +220,7 @@ def _column(at: SourceLine, heading: str, options: ReadOptions) -> _CsvColumn:
     uncertain, name = bool(matched[1]), matched[2].upper()
     if name in GENERIC and not uncertain:
         if not options.axis:
-            at.refuse(f"column {quote(heading)} does not state its axis", "--axis X")
+            at.refuse(f"column {quote(heading)} does not state its axis", "{axis} X")
         axis = options.axis_named(options.axis, at)
         along = "ABCXYZXYZ"["ABCXYZUVW".index(axis[0])]
         name = axis if GENERIC[name] == POSITION else f"E{along}{axis}"

@@ -23,7 +23,7 @@ RESOLUTION = 1e-4  # mm or degrees, as the tables are printed
 STEP_SHARE = 1e-3
 SIGN = (
     "values are errors, which the control subtracts (TNC 360 Technical Manual, page 4-24: the"
-    " table follows the error curve); --sign correction selects the opposite"
+    " table follows the error curve); the sign of a correction is the opposite"
 )
 TRAVEL = (
     "BACKLASH is the value for travel in the negative direction; the end values apply beyond the"
@@ -97,7 +97,7 @@ def _lookup_axis(source: Source, axes: dict[str, list[str]], options: ReadOption
         source.refuse(f"is entered for {', '.join(named)}", "one axis per table")
     if named:
         return options.axis_named(named[0], source)
-    return options.axis_of_file(source, "its .CMA file with it, or --axis X")
+    return options.axis_of_file(source, "its .CMA file with it, or {axis} X")
 
 
 def _lines(source: Source, along: str, options: ReadOptions, notes: list[str]) -> list[AxisTable]:

@@ -49,7 +49,7 @@ def _entries(source: Source, notes: list[str]) -> Entries:
 
 def _axis(source: Source, entries: Entries, options: ReadOptions) -> str:
     if options.axis or AXIS not in entries:
-        return options.axis_of_file(source, f"{AXIS}, or --axis X")
+        return options.axis_of_file(source, f"{AXIS}, or {{axis}} X")
     at, name = entries[AXIS]
     match = _AXIS_NAME.fullmatch(name)
     is_assigned = name.upper() in options.names

@@ -142,7 +142,7 @@ def _kind(source: Source, rows: np.ndarray, stated: str) -> tuple[str, tuple[str
     kind = POSITIONS if follows and not stays else OFFSETS
     if not stated:
         description = f"{CONTENTS[kind]} ({kind.replace('-', ' ')})"
-        return kind, (f"second and third column: {description}; --variant selects the other type",)
+        return kind, (f"second and third column: {description}; the other type is a variant",)
     if follows != stays and kind != stated:
         problem = f"looks like {CONTENTS[kind]}, but is {stated}"
         source.refuse(problem, f"{stated} (is it {kind}?)")
@@ -193,14 +193,14 @@ def _joint_tables(
         axis = (
             options.axis_named(axis, source)
             if axis
-            else options.axis_of_file(source, "--axis X, or its INI file")
+            else options.axis_of_file(source, "{axis} X, or its INI file")
         )
         if axis in tables and not has_pair:
             source.refuse(f"is a second table of {axis}", "one per joint, the limit of LinuxCNC")
         if has_pair and (options.machine is None or axis not in options.machine.gantries):
             source.refuse(
                 f"belongs to one of two joints of {axis}, the guides of a gantry",
-                f"--machine with [machine.gantry] {axis} = {{ span_mm = … }}, their distance",
+                f"{{machine}} with [machine.gantry] {axis} = {{ span_mm = … }}, their distance",
             )
         rows = _rows(source, per_unit, notes)
         kind, assumptions = _kind(source, rows, options.variant or kind)

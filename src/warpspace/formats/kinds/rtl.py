@@ -135,7 +135,7 @@ def _read_one(source: Source, options: ReadOptions) -> measured.ImportedErrors:
         pairs = [(at, _pair(text)) for at, text in sections.get("USER-TEXT", [])]
         named = [(at, pair[1]) for at, pair in pairs if pair and pair[0] == "axis" and pair[1]]
         if not named:
-            source.refuse("does not state its axis", "--axis X")
+            source.refuse("does not state its axis", "{axis} X")
         at, value = named[0]
         axis = options.axis_named(value.split()[0], at)
     table = _deviations(sections["DEVIATIONS"], len(targets), stated)

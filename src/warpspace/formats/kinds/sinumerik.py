@@ -35,8 +35,8 @@ MAX_TABLES = 62  # twice the axes of an NC (manual, "Compensation table index")
 SIGN = "a positive value makes the axis move in the negative direction (manual, page 238)"
 CEC_SIGN = (
     "a positive value makes the corrected axis move in the negative direction, as page 238 of the"
-    " manual states for $AA_ENC_COMP, but not for $AN_CEC: verify it on the machine, or use"
-    " --sign correction"
+    " manual states for $AA_ENC_COMP, but not for $AN_CEC: verify it on the machine, or select"
+    " the sign of a correction"
 )
 UNITS = "lengths mm, angles degrees (metric system)"
 DIGITS = 7  # decimals of a value: a tenth of a nanometre

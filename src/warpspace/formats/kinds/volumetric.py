@@ -44,7 +44,7 @@ ASSUMED = (
     "beyond the points, the end values apply",
 )
 ROTATION = (
-    "rotation about the nominal axis (alternative_model 0); --variant selects the distorted axis",
+    "rotation about the nominal axis (alternative_model 0); the distorted axis is a variant",
     "rotation about the distorted axis (alternative_model 1)",
 )
 DESCRIBED = (

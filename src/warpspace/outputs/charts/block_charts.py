@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
 from itertools import zip_longest
+from textwrap import wrap
 from typing import Any, cast
 
 import matplotlib as mpl
@@ -23,6 +24,8 @@ from warpspace.outputs.drawing.settings import FONT, LIGHT, SAVE_RC, Theme
 
 DPI = 160.0
 TITLE, SUBTITLE, TEXT, SMALL = 13.0, 9.5, 9.5, 8.5
+NO_DEVIATION = "No error: the path is a circle."
+WRAPPED = 0.75  # size of a title in two lines, as a share of its regular size
 LEAST_SHARE = 0.6  # smallest size of a title, as a share of its regular size
 _THEME: ContextVar[Theme] = ContextVar("theme of the charts", default=LIGHT)
 
@@ -75,8 +78,13 @@ def sheet(
         text = figure.text(x_left, y, heading, size=size, weight=weight, color=colour)
         text.set(va="top", parse_math=False)  # a $ in the title of a scene is a dollar
         wide = text.get_window_extent().width / figure.dpi
+        if wide > width - 0.5 and size == TITLE:  # in two lines
+            text.set(y=y + 0.1 / height, size=WRAPPED * size, linespacing=1.1)
+            length = int(len(heading) * (width - 0.5) / wide / WRAPPED)
+            text.set_text("\n".join(wrap(heading, length, max_lines=2, placeholder=" …")))
+            wide = text.get_window_extent().width / figure.dpi
         if wide > width - 0.5:  # smaller, so that it does not run off the sheet
-            text.set_fontsize(size * max((width - 0.5) / wide, LEAST_SHARE))
+            text.set_fontsize(text.get_fontsize() * max((width - 0.5) / wide, LEAST_SHARE))
     return figure, 1.0 - top_in / height
 
 
@@ -235,6 +243,8 @@ def _draw_panel(axis: Axes, panel: Panel, bars: Bars, size: float, *, first: boo
     axis.tick_params(axis="y", length=0)
     axis.tick_params(axis="x", labelsize=size)
     axis.set_xlim(-1.05 * longest if panel.signed else 0.0, end)
+    if panel is not bars.panels[-1]:  # a number at the end would meet the first of the next panel
+        axis.set_xticks([at for at in axis.get_xticks() if -end <= at < 0.9 * end])
     axis.set_xlabel(panel.unit if first or panel.unit != bars.panels[0].unit else "", size=size)
     axis.set_title(
         panel.title, size=TEXT * size / SMALL, weight="bold", loc="left" if first else "center"
@@ -271,6 +281,12 @@ def _draw_series(
             text.set_path_effects([Stroke(linewidth=2.5, foreground=ground().paper), Normal()])
 
 
+def is_empty(chart: Lines) -> bool:
+    """Check if a polar plot would show circles only."""
+    largest = max((float(np.abs(curve.y).max()) for curve in chart.curves), default=0.0)
+    return chart.kind == "polar" and largest < SMALLEST_DEVIATION
+
+
 def draw_lines(figure: Figure, chart: Lines, box: Box, size: float = SMALL) -> None:
     width, height = figure.get_size_inches() * SMALL / size
     x_left, bottom, wide, high = box
@@ -280,6 +296,9 @@ def draw_lines(figure: Figure, chart: Lines, box: Box, size: float = SMALL) -> N
     note = 0.2 / height if chart.note else 0.0
     figure.text(x_left + 0.3 / width, bottom + high - 0.05 / height, chart.title,
                 size=TEXT * size / SMALL, weight="bold", va="top")  # fmt: skip
+    if is_empty(chart):
+        figure.text(x_left + wide / 2, bottom + high / 2, NO_DEVIATION, ha="center", size=size)
+        return
     inner, under = (0.15, 0.1) if chart.kind == "polar" else (0.75, 0.5)
     wide_inside = max(wide - (inner + 0.2) / width, 0.2 * wide)
     high_inside = max(high - (under + 0.35) / height - legend - note, 0.1 * high)

@@ -183,6 +183,7 @@ def draw_scale_bars(
     return y - canvas.px(18.0)
 
 
+MOST_TITLE_LINES = 3
 HINTED = 0.92
 """Share of the width for measured text beside other text: hinting widens small letters."""
 
@@ -190,10 +191,12 @@ HINTED = 0.92
 def draw_heading(canvas: Canvas, title: str, facts: Sequence[str]) -> float:
     margin = canvas.margin
     max_width = canvas.width - 2.0 * margin
-    y = canvas.height - canvas.px(54.0)
-    canvas.text(margin, y, title, size=SIZES.title, weight="bold", max_width=max_width)
+    y = canvas.height - canvas.px(16.0)
+    for line in _wrap(canvas, title.split(), max_width, SIZES.title, "bold", " ", MOST_TITLE_LINES):
+        y -= canvas.px(38.0)
+        canvas.text(margin, y, line, size=SIZES.title, weight="bold", max_width=max_width)
     y -= canvas.px(14.0)
-    for line in _wrap(canvas, facts, max_width):
+    for line in _wrap(canvas, facts, max_width, SIZES.subtitle):
         y -= canvas.px(24.0)
         colour = canvas.theme.muted
         canvas.text(margin, y, line, size=SIZES.subtitle, colour=colour, max_width=max_width)
@@ -204,15 +207,18 @@ def draw_heading(canvas: Canvas, title: str, facts: Sequence[str]) -> float:
     return y
 
 
-def _wrap(canvas: Canvas, facts: Sequence[str], max_width: float) -> list[str]:
+def _wrap(
+    canvas: Canvas, parts: Sequence[str], max_width: float, size: float, weight: str = "normal",
+    between: str = " · ", max_rows: int = 2,
+) -> list[str]:  # fmt: skip
     rows: list[str] = []
-    for fact in facts:
-        joined = f"{rows[-1]} · {fact}" if rows else fact
-        fits = canvas.text_size(joined, SIZES.subtitle)[0] <= max_width
-        if rows and (fits or len(rows) == 2):
+    for part in parts:
+        joined = f"{rows[-1]}{between}{part}" if rows else part
+        fits = canvas.text_size(joined, size, weight)[0] <= max_width
+        if rows and (fits or len(rows) == max_rows):
             rows[-1] = joined
         else:
-            rows.append(fact)
+            rows.append(part)
     return rows
 
 

@@ -88,8 +88,12 @@ def draw_rotary(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
             subtitle += f" · {name}: the point lies on the axis"
         else:
             charts += [traces.motion_lines(name, motion, part) for part in motion.motions]
+    drawn = [chart for chart in charts if not block_charts.is_empty(chart)]
+    if drawn and len(drawn) < len(charts):
+        subtitle += f" · {len(charts) - len(drawn)} plots without error are omitted"
+    drawn = drawn or [replace(chart, title="All rotary axes") for chart in charts[:1]]
     return _draw(
-        "rotary", title, scene, settings, block_charts.charts_sheet, charts, title, subtitle, 3
+        "rotary", title, scene, settings, block_charts.charts_sheet, drawn, title, subtitle, 3
     )
 
 

@@ -211,12 +211,13 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     facts = [
         fact for fact in scene_facts(picture, factor) if not fact.startswith(("working", "2 "))
     ]
-    if largest == 0.0:
-        facts.append("these points are not displaced: no error of a rotary axis")
     legend = [
         line_entry("nominal trace", lambda theme: theme.muted, SIZES.thin, TRACE_DASHES),
         LegendEntry(_trace_symbol, "actual trace, exaggerated, coloured by its error"),
     ]
+    if largest == 0.0:
+        facts.append("no error of a rotary axis displaces these points: nominal traces only")
+        traces, coloured, legend = [], [], legend[:1]
     sheet = start_sheet("traces", settings, title, facts, scenes, legend, exact=exact)
     canvas = sheet.canvas
     points = [nominal, *(line.actual_mm for line in traces)]
@@ -226,6 +227,11 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     area = (x_left + inset, bottom + inset / 2, right - inset, top - inset / 2)
     projection = off_screen.fit_projection(settings.view, np.concatenate(points), area)
     raster = draw_bodies(canvas, placed, projection, opacity=FADED)
+    style = {"colour": canvas.theme.muted, "dashes": TRACE_DASHES, "zorder": 3.0}
+    paths = (line.nominal_mm for line in lines)
+    map3d.draw_split(canvas, paths, projection, raster, alpha=(1.0, 0.5), **style)
+    if not traces:
+        return sheet.finish(factor)
     _draw_lines(canvas, traces, coloured, scale, projection, raster)
     _label_traces(canvas, traces, projection, sheet.content)
     norms = np.concatenate([np.linalg.norm(trace.error_um, axis=-1) for trace in traces])
@@ -249,10 +255,6 @@ def _draw_lines(
     projection: off_screen.Projection,
     raster: off_screen.Raster | None,
 ) -> None:
-    theme = canvas.theme
-    nominal = (trace.nominal_mm for trace in traces)
-    style = {"colour": theme.muted, "dashes": TRACE_DASHES, "zorder": 3.0}
-    map3d.draw_split(canvas, nominal, projection, raster, alpha=(1.0, 0.5), **style)
     lines: tuple[list[Array], list[Array]] = ([], [])  # visible and hidden ones
     colours: tuple[list[Array], list[Array]] = ([], [])
     for trace, values in zip(traces, coloured, strict=True):
@@ -263,7 +265,7 @@ def _draw_lines(
                 lines[number].extend(part)
                 colours[number].extend([scale.colours(values[piece].mean()) / 255.0] * len(part))
     canvas.lines(lines[1], width=3.4, colour=np.array(colours[1]), alpha=0.45, zorder=3.3)
-    canvas.lines(lines[0], width=4.6, colour=theme.ink, zorder=3.4)
+    canvas.lines(lines[0], width=4.6, colour=canvas.theme.ink, zorder=3.4)
     canvas.lines(lines[0], width=3.4, colour=np.array(colours[0]), zorder=3.5)
 
 

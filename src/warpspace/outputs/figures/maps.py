@@ -199,7 +199,7 @@ def _draw_key(
     style = {"colour": theme.ghost, "dashes": map3d.GHOST_DASHES}
     map3d.draw_split(canvas, edges, projection, raster, alpha=(1.0, 0.5), **style)
     x, y = (rect[0] + rect[2]) / 2.0, rect[3] - canvas.px(12.0)
-    heading = "positions of the slices (not exaggerated)"
+    heading = "slices, not exaggerated"
     canvas.text(x, y, heading, weight="bold", ha="center", va="top")
 
 

@@ -82,17 +82,17 @@ class Control:
         self.used.add(number)
         if self.offset.get(number):
             self.refuse(
-                code, f"expected --offset {number}=0: other cutter radii are not compensated"
+                code, f"expected the offset {number}=0: other cutter radii are not compensated"
             )
         if number not in self.offset:
-            expected = f"--offset {number}=0 where the programmed path is that of the tool centre"
+            expected = f"the offset {number}=0 where the programmed path is that of the tool centre"
             self.refuse(code, f"expected {expected}")
 
     def select_system(self, code: str) -> None:
         """Select a work offset; it is refused where its block may mean another thing."""
         is_move = {"G0", "G1", "G2", "G3", "G53"} & {*self.codes}
         if code in {"G58", "G59"} and self.letters and not (is_move or self.dialect):
-            expected = "--dialect fanuc (a work offset and a move) or sinumerik (a shift)"
+            expected = "the dialect fanuc (a work offset and a move) or sinumerik (a shift)"
             self.refuse(code, f"expected {expected}")
         system, self.system = self.system, code
         if code in {"G54.1", "G154"}:
@@ -129,7 +129,7 @@ class Control:
         if self.frame is not None or "G254" in self.shift:
             self.refuse(code, "expected frames cancelled before")
         if kind not in {2, 20} or not self.absolute or (kind == 20 and not self.dialect):
-            expected = "L2, L10 R, or L20 with --dialect, in G90"
+            expected = "L2, L10 R, or L20 with a dialect, in G90"
             self.refuse(f"{code} L{kind:g}", f"expected {expected}")
         system = self.system if number == "0" else (*SYSTEMS, *[""] * 6)[:6][int(number) - 1]
         if kind == 20 and is_listed:

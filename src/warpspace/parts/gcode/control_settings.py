@@ -75,5 +75,5 @@ class ControlSettings:
         tuple[tuple[str, float], ...], Grammar("G54X=..,H1=..", _offsets, many=True)
     ] = option(
         (), "Positions of axes where words of a work offset are zero, and lengths of tools by H",
-        unset="at axes zero; --length for all tools",
+        unset="at axes zero; one length for all tools",
     )  # fmt: skip

@@ -22,7 +22,7 @@ class Cycles(TiltedPlanes):
         if motion in PECKING and self.dialect == "haas":
             stored |= {*"IJK"}  # first peck, reduction, minimum
         elif motion in PECKING and "K" in self.words and "K" not in self.integers:
-            expected = "repetitions without a decimal point, or --dialect haas (minimum peck)"
+            expected = "repetitions without a decimal point, or the dialect haas (minimum peck)"
             self.refuse(f"K{self.words['K']:g}", f"expected {expected}")
         self.cycle |= {x: self.value(x) for x in stored & self.words.keys()}
         if deep not in self.index or not {deep, "R"} <= self.cycle.keys():

@@ -243,11 +243,11 @@ class Interpreter(Cycles):
                 self.refuse(spelling, "expected a letter and a number")
             else:
                 dialects = [
-                    f", --dialect {name}"
+                    f", dialect {name}"
                     for name, dialect in DIALECTS.items()
                     if word in dialect.motionless or dialect.codes.get(word)
                 ]
-                options = "".join(dialects) + f", or --skip {word}"
+                options = "".join(dialects) + f", or {word} to be skipped"
                 self.refuse(word, f"expected a word that is executed or moves no axis{options}")
         if ignored:
             self.skipped.setdefault(" ".join(ignored), self.line)
