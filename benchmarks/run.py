@@ -33,6 +33,7 @@ BENCHMARKS = (
     "bench_figures",
     "bench_app",
     "bench_tabs",
+    "bench_playback",
 )
 """One module each, with a function `measure` that gives a `Section`."""
 APART = ("bench_cluster", "bench_machines")

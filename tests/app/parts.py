@@ -1,7 +1,7 @@
 """Parts of the page without a page."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,10 +9,12 @@ from warpspace.analysis.registry import entries
 from warpspace.app.browser.actions import AnyAction, Input, Upload
 from warpspace.app.documents.output_services import Services
 from warpspace.app.documents.scene_file import SceneList
+from warpspace.app.drawing.player import Player, Track, find_tracks
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore
 from warpspace.exceptions import WarpspaceError
+from warpspace.scene.notes import story
 
 LIVE = LiveModel()
 
@@ -20,7 +22,7 @@ LIVE = LiveModel()
 class Nobody(SimpleNamespace):
     """The context of a page that is not there; what it posts and tells a user goes into lists."""
 
-    is_paused, picture, stage = True, None, None
+    is_paused, picture = True, None
 
     def __init__(self, **given: Any) -> None:
         posted, told = [], []
@@ -31,6 +33,11 @@ class Nobody(SimpleNamespace):
             notify=lambda *words: told.append(words), save_file=lambda *file: told.append(file),
         )  # fmt: skip
         vars(self).update(given)
+        self.player = Player(self.find_tracks)
+
+    def find_tracks(self, picture: Any = None) -> Mapping[str, Track]:
+        picture = picture or self.picture
+        return {} if picture is None else find_tracks(picture, len(story(self.state.review)))
 
     def __getattr__(self, name: str) -> Any:  # the state is that of its store, unless one is set
         if name == "state":

@@ -1,13 +1,12 @@
 """What is drawn in a real Chromium: surfaces, lines, marks, machine, rotary axes."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from app.frames import new_visitor
-from app.page_tab import SCENES, Tab, same_points
+from app.page_tab import SCENES, Tab, same_points, wait_until_open
 from warpspace.app.browser import actions as do
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.machine_bodies import drawn_bodies, tool_point
@@ -82,21 +81,21 @@ def test_the_table_turns_until_the_page_is_left(open_tab):
     tab = open_tab()
     tab.send(do.ShowMachine("solid"))
     tab.until(lambda: tab.drawn("/machine/C_table") is not None)
-    still, stage = tab.still(lambda: tab.drawn("/machine/C_table")), tab.session.context.stage
+    still, player = tab.still(lambda: tab.drawn("/machine/C_table")), tab.session.context.player
     tab.task("Machine")
     tab.unfold("Rotary axes")
-    turn = tab.page.get_by_role("button", name=re.compile("^Turn [ABC]"))
-    turn.click()
-    tab.until(lambda: stage.playing)
+    play = tab.page.locator("[data-piece='section.rotary']").get_by_role("button", name="Play C")
+    play.click()
+    tab.until(lambda: player.playing == "C")
     tab.until(lambda: not np.allclose(tab.drawn("/machine/C_table"), still, atol=1.0))
     tab.until(lambda: tab.drawn("/rotation/actual") is not None)
-    tab.click("Pause")
-    tab.until(lambda: not stage.playing)
-    tab.click("Stop")
+    tab.click("Pause C")
+    tab.until(lambda: not player.playing)
+    tab.click("Reset")
     tab.until(lambda: np.allclose(tab.drawn("/machine/C_table"), still, atol=1e-3))
     tab.until(lambda: tab.drawn("/rotation/actual") is None)
-    turn.click()
-    tab.until(lambda: stage.playing)
+    play.click()
+    tab.until(lambda: player.playing == "C")
     worker = tab.session.worker
     tab.page.goto("about:blank")
     tab.until(lambda: not worker.is_alive())
@@ -149,3 +148,20 @@ def test_no_first_view_for_reduced_motion_and_programs(viewer, browser):
         with new_visitor(browser, **options) as context:
             tab = Tab(context.new_page(), viewer, query)
             assert tab.page.evaluate(GREET) == [0, 0]
+
+
+def test_the_exaggeration_is_played_by_keys(tab):
+    factor = tab.session.context.picture.exaggeration
+    tab.page.keyboard.press("p")
+    tab.until(lambda: 1.0 < tab.session.context.picture.exaggeration < factor)
+    tab.page.keyboard.press("p")
+    tab.until(lambda: not tab.session.context.player.playing)
+    slider = tab.page.get_by_label("Position of the exaggeration", exact=True)
+    for key, end in (("Home", 1.0), ("End", factor), ("ArrowLeft", factor**0.99)):
+        slider.press(key)
+        tab.until(lambda end=end: abs(tab.session.context.picture.exaggeration - end) < 1e-3 * end)
+    assert not tab.session.context.player.is_still
+    tab.page.emulate_media(reduced_motion="reduce")
+    tab.page.reload()
+    wait_until_open(tab.page)
+    tab.until(lambda: tab.session.context.player.is_still)

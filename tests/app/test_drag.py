@@ -9,6 +9,7 @@ from app.parts import LIVE
 from app.wire import opened
 from warpspace.app.browser import actions as do
 from warpspace.app.documents import legend
+from warpspace.app.drawing.camera import CameraMemory, is_in_view
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.live_model import DrawnScale
 from warpspace.app.server.session import same_scales
@@ -116,3 +117,67 @@ def test_both_ends_of_a_range_that_is_exceeded_say_so():
     assert [texts[0][:2], texts[-1][:2]] == ["< ", "> "]
     ends = [mark.text for mark in legend.marks(picture) if not mark.name]
     assert all(text[0] not in "<>" for text in ends)
+
+
+# --- The camera keeps the box in its picture ------------------------------------------------------
+
+
+def set_factor(wire, session, factor):
+    wire.say(do.SetLeaf("exaggeration", factor))
+    assert wire.read_until(lambda: f"{session.context.picture.exaggeration:g}" == factor)
+
+
+def flights(wire):
+    return wire.calls["Page.fly"]
+
+
+def test_the_camera_moves_back_for_a_larger_box_and_to_the_box_of_before():
+    with opened(FIRST) as (wire, session):
+        camera = session.context.camera
+        near = camera.remember()
+        set_factor(wire, session, "2000")  # still in the picture
+        assert camera.remember() == near
+        wire.say(do.SetLeaf("exaggeration", "100000"))
+        assert wire.read_until(lambda: flights(wire) == 1)
+        picture, aspect = session.context.picture, camera.room.aspect
+        assert not is_in_view(near, picture.drawn_mm, aspect)
+        (view,) = wire.latest["Page.fly"][:1]
+        moved = CameraMemory(**{k: tuple(v) if k != "fov_rad" else v for k, v in view.items()})
+        assert is_in_view(moved, picture.drawn_mm, aspect)
+        camera._stand_at(moved)  # as the page does
+        wire.say(do.SetLeaf("exaggeration", "1000"))
+        assert wire.read_until(lambda: flights(wire) == 2)
+
+
+def test_a_camera_set_by_hand_stays_and_a_message_offers_to_fit_the_view():
+    with opened(FIRST) as (wire, session):
+        camera = session.context.camera
+        place = camera.remember()
+        x, y, z = place.position
+        camera._stand_at(replace(place, position=(x + 0.5, y, z)))
+        set_factor(wire, session, "100000")
+        assert wire.read_until(lambda: bool(wire.toasts))
+        assert wire.toasts[-1][-1] == ["Fit view", "fit_view"]
+        assert flights(wire) == 0
+        wire.toasts.clear()
+        set_factor(wire, session, "90000")  # it is out of the view already
+        assert not wire.read_until(lambda: bool(wire.toasts), seconds=0.5)
+        wire.say(do.Signal.FIT_VIEW)
+        assert wire.read_until(
+            lambda: is_in_view(
+                camera.remember(), session.context.picture.drawn_mm, camera.room.aspect
+            )
+        )
+
+
+def test_the_camera_stays_during_a_drag():
+    with opened(FIRST) as (wire, session):
+        drag(wire, "EA0Z", "20000")
+        assert wire.read_until(lambda: session.context.picture.state.amplitudes["EA0Z"] == 20000.0)
+        camera = session.context.camera
+        drawn = session.context.picture.drawn_mm
+        assert not is_in_view(camera.remember(), drawn, camera.room.aspect)
+        wire.say(do.Signal.RELEASE)  # the box is small again
+        assert wire.read_until(lambda: session.context.picture.drawn_mm is not drawn)
+        assert flights(wire) == 0
+        assert wire.toasts == []

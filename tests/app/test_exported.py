@@ -16,13 +16,16 @@ import glb
 from offline import EVIL, opened_offline, wait_for_the_map
 from warpspace.app.documents import legend
 from warpspace.app.documents.offline_page import build_offline_html, offline_picture
+from warpspace.app.documents.output_services import CancelledError
 from warpspace.app.documents.transfers import exported_words, file_stem, shown_sides
 from warpspace.app.drawing.camera import CameraMemory, fit_camera
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
-from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.evaluation.live_model import DrawnScale, LiveModel
+from warpspace.app.panels.panel import Job
 from warpspace.app.state.app_state import Picked, Side, start_state
 from warpspace.app.state.tree import put
-from warpspace.cli.services import draw_figure, draw_view, write_export
+from warpspace.cli import services
+from warpspace.cli.services import draw_animation, draw_figure, draw_view, write_export
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
 from warpspace.outputs.drawing.settings import FigureSettings
@@ -43,6 +46,34 @@ WORDS = {
 
 def picture_of(shown, state=BOTH):
     return LIVE.evaluate(put(state, "comparison.shown", shown))
+
+
+def test_an_animation_is_a_webp_up_to_the_factor_of_the_drawing(monkeypatch):
+    monkeypatch.setattr(services, "ANIMATION_FRAMES", 4)
+    monkeypatch.setattr(services, "ANIMATION_SIZE", (400, 300))
+    shares, job = [], Job("Animation", lambda: None)
+    job.report_progress = shares.append
+    paused = LIVE.evaluate(START, DrawnScale(10.0))  # the player stands at a smaller factor
+    film = Image.open(BytesIO(draw_animation(paused, "exaggeration", job)))
+    assert (film.format, film.n_frames, film.size) == ("WEBP", 4, (400, 300))
+    assert shares == [0.25, 0.5, 0.75, 1.0]
+    frames = []
+    for number in range(4):
+        film.seek(number)
+        frames.append(np.asarray(film.convert("L"), dtype=float))
+    away = [np.abs(frame - frames[0]).mean() for frame in frames]
+    assert away[2] > away[1] > 0.1  # there and ..
+    assert away[3] == pytest.approx(away[1], rel=0.05)  # .. back
+
+
+def test_an_animation_is_cancelled_and_shows_one_machine(monkeypatch):
+    monkeypatch.setattr(services, "ANIMATION_FRAMES", 4)
+    job = Job("Animation", lambda: None)
+    job.set()
+    with pytest.raises(CancelledError):
+        draw_animation(LIVE.evaluate(START), "exaggeration", job)
+    with pytest.raises(OptionError, match="one machine"):
+        draw_animation(picture_of("difference"), "exaggeration", job)
 
 
 def rows_of(picture):

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -286,18 +285,14 @@ def test_traces_are_drawn_in_numbers_where_an_error_moves_them():
     assert "no rotary axis" in body_of(machine_editor.RotarySection, mill)
 
 
-def test_a_table_that_is_paused_can_stand_there_and_axes_be_held_at_quarters():
-    section = lone_part(machine_editor.RotarySection)
+def test_the_axis_is_played_and_axes_are_held_at_quarters():
     state = replace(STATE, page=replace(STATE.page, task="machine", open=frozenset({"rotary"})))
-    section.context.stage = SimpleNamespace(playing=False, position={"C": 89.7}, followers={})
-    text = section.body(LIVE.evaluate(state))
+    text = body_of(machine_editor.RotarySection, state)
     for action in (
-        do.SetLeaf("positions.C", "90"), do.SetLeaf("rotary.held.C", "0,90,180,270"),
+        do.Input.PLAY("C"), do.SetLeaf("rotary.held.C", "0,90,180,270"),
         do.SetLeaf("rotary.off", "+1"),
     ):  # fmt: skip
         assert attributes(data_do=action) in text
-    section.context.stage.position = {"B": -25.0}  # another axis was moved by hand
-    assert "positions.C" not in section.body(LIVE.evaluate(state))
 
 
 # --- A scene alone -------------------------------------------------------------------------------

@@ -1,22 +1,18 @@
 """The drawing of the rotary axes: what it shows, against closed forms, and its playback."""
 
-import time
-from contextlib import nullcontext
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from app.parts import LIVE, Alone, lone_part
 from warpspace.app.browser import actions as do
+from warpspace.app.browser.html import attributes
 from warpspace.app.documents import legend
 from warpspace.app.drawing.around import draw_surroundings
 from warpspace.app.drawing.box import box
 from warpspace.app.drawing.labels import axis_labels, point_labels
-from warpspace.app.drawing.moving import MovingLayer
 from warpspace.app.evaluation.compare import with_pin
-from warpspace.app.evaluation.machine_bodies import played_angle, played_position
 from warpspace.app.panels.error_list import _gains
 from warpspace.app.panels.overlay import ControlsPanel, HeadPanel, OrderPanel
 from warpspace.app.panels.playback import PlaybackPanel
@@ -28,26 +24,6 @@ from warpspace.scene.library import load_scene
 FIRST = load_scene("dvf5000_first")
 START = start_state(FIRST, nodes=5)
 ROTARY = put(START.zeroed(), "look.drawing", "rotary")
-
-
-class Stage:
-    """A stage that records what the bar asks of it."""
-
-    def __init__(self):
-        self.followers, self.position, self.playing, self.axis = {}, {}, False, None
-        self.speed_deg_s, self.asked, self.sample = 30.0, [], None
-
-    def play(self, on, axis=None):
-        self.asked.append(("play", on, axis))
-        self.playing, self.axis = bool(on), axis
-
-    def scrub_program(self, sample):
-        self.asked.append(("program", sample))
-        self.sample = sample
-
-    def scrub(self, axis, at_deg):
-        self.asked.append(("scrub", axis, at_deg))
-        self.position = {**self.position, axis: at_deg}
 
 
 def test_a_tilt_of_c_moves_the_traces_by_its_angle_and_their_height():
@@ -148,37 +124,75 @@ def test_the_effect_of_a_rotary_error_is_that_over_the_range_of_its_axis():
     assert gains["EB0C"] >= traced > 0.1
 
 
-@pytest.mark.parametrize(("axis", "at"), [("C", 140.0), ("B", -25.0), ("C", 0.0), ("B", 30.0)])
-def test_play_begins_where_the_axis_was_scrubbed_to(axis, at):
-    angle = played_angle(START, axis, at)
-    assert played_position(START, angle, axis)[axis] == pytest.approx(at)
-
-
 def test_the_bar_plays_pauses_scrubs_and_ignores_what_is_no_position():
-    stage = Stage()
-    bar = Alone(PlaybackPanel, ROTARY, stage=stage)
+    bar = Alone(PlaybackPanel, ROTARY)
+    player = bar.context.player
     bar.do(do.Input.PLAY("B"))
+    assert player.playing == "B"
     bar.do(do.Input.PLAY("B"))
+    assert player.playing == ""
     bar.do(do.Input.PLAY())
+    assert player.playing == "B"
     bar.do(do.Scrub("C", "140"))
+    assert player.playing == ""
+    assert player.at["C"] == 140.0
     bar.do(do.Scrub("B", "1e9"))
+    assert player.at["B"] == FIRST.machine.axes["B"].travel[1]
+    at = dict(player.at)
     for hostile in ("nan", "<b>", "", "9" * 400):
-        bar.do(do.Scrub("C", hostile))
-    bar.do(do.Scrub("X", "5"))
-    bar.do(do.Input.SET_SPEED("90"))
-    bar.do(do.Input.SET_SPEED("inf"))
-    bar.do(do.Signal.STOP_PLAYBACK)
-    high = FIRST.machine.axes["B"].travel[1]
-    top = FIRST.machine.axes["C"].travel[1]
-    assert stage.asked == [
-        ("play", True, "B"), ("play", False, "B"), ("play", True, "B"), ("scrub", "C", 140.0),
-        ("scrub", "B", high), ("scrub", "C", top), ("play", None, None),
-    ]  # fmt: skip
-    assert stage.speed_deg_s == 90.0
+        bar.do(do.Scrub("B", hostile))
+    for action in (do.Scrub("X", "5"), do.Input.SET_SPEED("inf"), do.Input.CHOOSE_TRACK("<b>")):
+        bar.do(action)
+    bar.do(do.Input.CHOOSE_TRACK("story"))
+    assert player.at == {**at, "B": FIRST.machine.axes["B"].travel[1]}
+    assert player.speed == 1.0
+    bar.do(do.Input.SET_SPEED("3"))
+    assert player.speed == 3.0
     html = bar.part.render(LIVE.evaluate(ROTARY))["playback"]
     assert 'aria-label="Position of C"' in html
-    volume = LIVE.evaluate(put(ROTARY, "look.drawing", "volume"))
-    assert bar.part.render(volume)["playback"] == ""
+    assert ">90 °/s</option>" in html
+    bar.do(do.Signal.STOP_PLAYBACK)
+    assert (player.at, player.playing) == ({}, "")
+    volume = Alone(PlaybackPanel, put(ROTARY, "look.drawing", "volume"))
+    assert volume.part.render(volume.context.picture)["playback"] == ""
+
+
+def test_a_paused_axis_can_be_moved_to_its_position():
+    bar = Alone(PlaybackPanel, ROTARY)
+    for name, at in (("C", "89.7"), ("B", "-25")):
+        assert f"positions.{name}" not in bar.part.render(bar.context.picture)["playback"]
+        bar.do(do.Scrub(name, at))
+    html = bar.part.render(bar.context.picture)["playback"]
+    for name, at in (("C", "90"), ("B", "-25")):
+        assert attributes(data_do=do.SetLeaf(f"positions.{name}", at)) in html
+    bar.do(do.Input.PLAY("C"))
+    assert "Move axes here" not in bar.part.render(bar.context.picture)["playback"]
+
+
+def test_the_exaggeration_is_played_where_nothing_else_is_drawn_that_plays():
+    bar = Alone(PlaybackPanel, START)
+    player, factor = bar.context.player, bar.context.picture.exaggeration
+    bar.do(do.Input.PLAY())  # P
+    assert player.playing == "exaggeration"
+    assert player.at["exaggeration"] == 1.0  # from true scale
+    bar.do(do.Scrub("exaggeration", "1"))  # the slider is logarithmic
+    assert player.at["exaggeration"] == pytest.approx(10.0)
+    html = bar.part.render(bar.context.picture)["playback"]
+    assert "<span>×10</span>" in html
+    assert f'max="{np.log10(factor):g}"' in html
+    assert '<option value="C">' in html
+    assert attributes(data_do=do.SaveAnimation("exaggeration")) in html
+    bar.do(do.Input.CHOOSE_TRACK("C"))
+    html = bar.part.render(bar.context.picture)["playback"]
+    assert 'aria-label="Position of C"' in html
+    assert 'aria-label="Position of the exaggeration"' not in html
+    assert attributes(data_do=do.SaveAnimation("rotation")) in html
+    traces = Alone(PlaybackPanel, ROTARY.with_amplitude("EB0C", 20.0))
+    traces.do(do.Input.CHOOSE_TRACK("exaggeration"))  # an animation of it shows the volume
+    assert "SaveAnimation" not in traces.part.render(traces.context.picture)["playback"]
+    zero = Alone(PlaybackPanel, START.zeroed())
+    zero.do(do.Input.PLAY())
+    assert zero.context.player.playing == ""
 
 
 PROGRAM_TEXT = "G21 G90 G54\nG0 X-200 Y0 Z-100\nG1 X200 F500\nG1 Y200\nM30\n"
@@ -190,14 +204,13 @@ def with_program():
 
 
 def test_a_program_is_played_to_its_worst_block_with_line_error_and_cause():
-    state, stage = with_program(), Stage()
-    picture = LIVE.evaluate(state)
+    bar = Alone(PlaybackPanel, with_program())
+    picture, player = bar.context.picture, bar.context.player
     assert picture.path is not None
-    bar = Alone(PlaybackPanel, state, stage=stage)
-    assert 'aria-label="Position in the program"' in bar.part.render(picture)["playback"]
+    assert 'aria-label="Position of the program"' in bar.part.render(picture)["playback"]
     bar.do(do.Signal.SHOW_WORST_BLOCK)
     lengths = np.linalg.norm(picture.path.error_um, axis=1)
-    assert stage.asked == [("play", False, None), ("program", int(np.argmax(lengths)))]
+    assert player.step_of("program") == int(np.argmax(lengths))
     html = bar.part.render(picture)["playback"]
     line = int(picture.path.of.line[np.argmax(lengths)])
     assert f"line {line}</span>" in html
@@ -205,10 +218,12 @@ def test_a_program_is_played_to_its_worst_block_with_line_error_and_cause():
     assert f"{lengths.max():.1f} µm, " in html
     assert " because " in html
     bar.do(do.Scrub("program", "3"))
+    assert player.step_of("program") == 3
     bar.do(do.Scrub("program", "99999999"))
+    assert player.step_of("program") == len(lengths) - 1
     bar.do(do.Scrub("program", "<b>"))
     bar.do(do.Input.PLAY("program"))
-    assert stage.asked[2:] == [("program", 3), ("play", True, "program")]
+    assert (player.playing, player.step_of("program")) == ("program", 0)  # again from the start
 
 
 def test_the_cause_of_a_sample_is_that_of_the_explanation_of_its_point():
@@ -225,33 +240,9 @@ def test_the_cause_of_a_sample_is_that_of_the_explanation_of_its_point():
         )
         assert value or not effects[key]
     first = max(effects, key=lambda key: abs(effects[key]))
-    bar = Alone(PlaybackPanel, state, stage=Stage())
+    bar = Alone(PlaybackPanel, state)
     bar.do(do.Signal.SHOW_WORST_BLOCK)
     assert f"because {parameter(first).cause}" in bar.part.render(picture)["playback"]
-
-
-def test_the_stage_moves_the_machine_along_the_program():
-    """The layer with a client that draws nothing."""
-    state = with_program()
-    picture = LIVE.evaluate(state)
-    stage = MovingLayer.__new__(MovingLayer)
-    stage._picture, stage.followers, stage.sample, stage._turned_at = picture, {}, None, None
-    stage.axis, stage.speed_deg_s, stage.position, stage._turned_deg = None, 30.0, {}, 0.0
-    stage._client = SimpleNamespace(atomic=nullcontext)
-    stage._turning = SimpleNamespace(draw=lambda shapes: None)
-    stage.play(True, "program")
-    stage._turned_at -= 0.4  # of the 20 s of a program
-    stage.turn()
-    count = len(picture.path.of.line)
-    assert 0.01 * count < stage.sample < 0.05 * count + 1.0
-    assert stage.position == picture.path.of.axes_at(int(stage.sample))
-    stage.scrub_program(1e9)
-    assert stage.sample == count - 1
-    stage._turned_at = time.monotonic() - 0.4
-    stage.turn()
-    assert not stage.playing
-    stage.play(None)
-    assert (stage.sample, stage.position) == (None, {})
 
 
 def test_a_comparison_of_rotary_errors_shows_their_change():

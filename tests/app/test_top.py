@@ -165,6 +165,18 @@ def test_files_that_a_page_refuses_or_invents_are_said_or_left():
     assert "cannot be read" in window.said[-1][1]
 
 
+def test_the_bar_has_an_animation_written_with_its_progress():
+    asked = []
+    write = Services(draw_animation=lambda _, motion, job: asked.append(motion) or b"RIFF")
+    window = Alone(FilesDialog, STATE, services=write)
+    state = window.do(do.SaveAnimation("rotation"))
+    wait(window.part)
+    assert (asked, state.page.window) == (["rotation"], "files")
+    ((name, content),) = window.saved
+    assert name.endswith("_rotation.webp")
+    assert content == b"RIFF"
+
+
 def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_own():
     asked, done = [], (b"%PDF", ())
     write = Services(write_report=lambda _, *about: asked.append(about) or done)

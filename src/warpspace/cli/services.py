@@ -18,8 +18,10 @@ from warpspace.app.documents.output_services import CancelledError, Services
 from warpspace.app.documents.scene_file import file_notes, reopened
 from warpspace.app.documents.transfers import shown_sides
 from warpspace.app.drawing.camera import CameraMemory
+from warpspace.app.drawing.player import whole_factor
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.panels.panel import Job
 from warpspace.app.state.app_state import START_NODES, start_state
 from warpspace.cli.shared_options import write_text
 from warpspace.exceptions import OptionError, WarpspaceError
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
 
 MAX_RENDERERS = 2  # figures drawn at the same time, all tabs together
 POLL_S = 0.1
+ANIMATION_SIZE, ANIMATION_FRAMES, ANIMATION_FPS = (800, 600), 60, 15.0
 MAPS = "warpspace.outputs.charts.result_charts:compensation_maps"
 _renderers = threading.Semaphore(MAX_RENDERERS)
 
@@ -50,6 +53,7 @@ _renderers = threading.Semaphore(MAX_RENDERERS)
 def build_services() -> "Services":
     return Services(
         draw_figure,
+        draw_animation,
         draw_view,
         write_export,
         write_report,
@@ -102,6 +106,29 @@ def _figure_of(
         conditions=conditions,
     )
     return name, [side.active_scene() for side in sides], settings
+
+
+def draw_animation(picture: "LivePicture", motion: str, job: "Job") -> bytes:
+    """Draw the picture of a page with a motion, as an animated WebP of four seconds."""
+    from warpspace.outputs.animation import AnimationSettings, write_animation
+
+    _, scenes, figure = _figure_of(picture)
+    if len(scenes) > 1:
+        raise OptionError("an animation shows one machine; draw A or B, not their difference")
+    factor = whole_factor(picture)
+    if motion == "rotation" and not picture.is_rotary:
+        factor = picture.state.exaggeration or "auto"  # that of the traces, not of the volume
+    figure = replace(figure, exaggeration=factor, size=ANIMATION_SIZE)
+    settings, count = AnimationSettings(motion, ANIMATION_FRAMES, ANIMATION_FPS, figure), [0]
+
+    def report_progress(n_frames: int) -> None:
+        count[0] += n_frames
+        job.report_progress(count[0] / ANIMATION_FRAMES)
+
+    with _renderer_slot(job), temporary_folder() as folder:
+        target = folder / "animation.webp"
+        write_animation(scenes[0], target, settings, progress=report_progress)
+        return target.read_bytes()
 
 
 def draw_view(

@@ -37,6 +37,7 @@ class Signal(StrEnum):
     RISE = auto()  # the first view begins
     HOLD = auto()  # a drag of a slider begins
     RELEASE = auto()
+    REDUCE_MOTION = auto()  # the page wants no animations
     ZERO_ERRORS = auto()
     RESET_ERRORS = auto()
     INCLUDE_ERRORS = auto()
@@ -53,6 +54,8 @@ class Signal(StrEnum):
     START_STORY = auto()
     NEXT_STEP = auto()
     PREVIOUS_STEP = auto()
+    FIRST_STEP = auto()
+    LAST_STEP = auto()
     END_STORY = auto()
     OPEN_COMPARISON = auto()
     PIN_AS_A = auto()
@@ -68,8 +71,6 @@ class Signal(StrEnum):
     RESET_TOLERANCES = auto()
     SAVE_TABLE = auto()
     DRAW_CONCEPTS = auto()
-    TURN_ROTARY = auto()
-    STOP_ROTARY = auto()
     STOP_PLAYBACK = auto()
     SHOW_WORST_BLOCK = auto()
 
@@ -89,6 +90,7 @@ class Input(StrEnum):
     SET_TRAVEL = auto()
     SET_SPEED = auto()
     PLAY = auto()
+    CHOOSE_TRACK = auto()
     FIND_ERRORS = auto()
     UNFOLD_ERROR = auto()
     SHOW_LEVER_OF = auto()
@@ -204,6 +206,10 @@ class Scrub(Action):
     value: Text = ""
 
 
+class SaveAnimation(Action):
+    motion: Literal["exaggeration", "rotation"]
+
+
 class OpenSection(Action):
     task: Name
     section: Name
@@ -296,7 +302,7 @@ class PointAt(Action):
 AnyAction: TypeAlias = (
     Signal | InputValue | Run | Cancel | AddToReport | RemoveOverlay | RemoveFile | Preview | Apply
     | SaveResult | SetOption | Upload | SetLeaf | SetError | EditCurve | EditMachine | SetSide
-    | Scrub | OpenSection | Share | WriteReport | RemoveFromReport | TurnPart | ShowBox | DrawMaps
-    | ShowMachine | ShowDrawing | ViewFrom | SetOrthographic | RevealNote | EditNote
-    | ChooseVersion | ReplyToNote | TabHere | StoredCopy | Resize | PointAt
+    | Scrub | SaveAnimation | OpenSection | Share | WriteReport | RemoveFromReport | TurnPart
+    | ShowBox | DrawMaps | ShowMachine | ShowDrawing | ViewFrom | SetOrthographic | RevealNote
+    | EditNote | ChooseVersion | ReplyToNote | TabHere | StoredCopy | Resize | PointAt
 )  # fmt: skip

@@ -373,7 +373,7 @@
   // --- messages that disappear by themselves; the columns end above them ---------------------------
   new ResizeObserver(([{ target }]) => shell.style.setProperty("--ws-said", `${target.offsetHeight}px`))
     .observe(shell.querySelector("#ws-toasts"));
-  const toast = (kind, title, text = "") => {
+  const toast = (kind, title, text = "", action = null) => {
     const box = document.createElement("section");
     box.className = `ws-toast ws-${kind}`;
     box.append(Object.assign(document.createElement("strong"), { textContent: title }));
@@ -384,6 +384,13 @@
     close.onclick = leave;
     box.append(close);
     const shelf = shell.querySelector("#ws-toasts");
+    if (action) {  // label and event of a button; one such message at a time
+      const button = Object.assign(document.createElement("button"),
+        { textContent: action[0], className: "ws-action", onclick: leave });
+      [button.dataset.do, box.dataset.action] = [action[1], action[1]];
+      shelf.querySelector(`[data-action="${action[1]}"]`)?.remove();
+      box.append(button);
+    }
     shelf.append(box);
     raiseToasts();
     if (kind !== "stays") setTimeout(leave, TOAST_MS);
@@ -437,6 +444,7 @@
         .map(byte => byte.toString(16).padStart(2, "0")).join(""));
       pending.splice(0);
       send({ do: "TabHere", token: window.__warpspaceTab });
+      if (matchMedia("(prefers-reduced-motion: reduce)").matches) send("reduce_motion");
       tidyAddress();
       const link = linkOf();
       known.hasLink = Boolean(link) && link !== (stored() || window.__warpspaceLink);

@@ -11,6 +11,7 @@
     if (on) root.requestFullscreen?.().catch(() => { /* stays in the window */ });
     else if (document.fullscreenElement) document.exitFullscreen().catch(() => {});
   };
+  page.fly = warpspaceFly;
   // a step: duration of the animation of points, colours and camera, ms
   page.step = (duration, camera) => {
     warpspaceMesh.glide = duration;
@@ -18,9 +19,10 @@
   };
   addEventListener("keydown", event => {
     if (!isPlaying() || event.ctrlKey || event.metaKey || event.altKey) return;
-    const press = [" ", "Enter"].includes(event.key) && event.target.closest?.("button, a, summary");
+    const press = [" ", "Enter"].includes(event.key) && event.target.closest?.("button, a, summary, select");
     const action = { ArrowRight: "next_step", " ": "next_step", ArrowLeft: "previous_step",
-      Escape: "end_story" }[event.key];
+      Home: "first_step", End: "last_step", Escape: "end_story",
+      p: { do: "InputValue", input: "play" } }[event.key];
     event.stopImmediatePropagation();  // hidden parts of the page must not react
     if (press || !action) return;
     event.preventDefault();

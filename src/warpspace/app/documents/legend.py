@@ -168,15 +168,9 @@ def part_html(picture: LivePicture) -> Markup:
 # --- The heading ----------------------------------------------------------------------------------
 
 
-def _largest_um(picture: LivePicture) -> float:
-    if picture.is_rotary:
-        return float(np.linalg.norm(picture.traced_um, axis=-1).max(initial=0.0))
-    return float(picture.field.norm_um.max())
-
-
 def largest_words(picture: LivePicture) -> str:
     """Format the heading: ``Errors up to 51.7 µm``."""
-    largest = _largest_um(picture)
+    largest = picture.largest_um
     subject = "Change" if picture.is_difference else "Errors"
     if picture.is_rotary:
         subject = f"{'Change of rotary' if picture.is_difference else 'Rotary'} errors"
@@ -189,7 +183,7 @@ def numbers_words(picture: LivePicture) -> str:
     if picture.is_rotary:
         traced = np.linalg.norm(picture.traced_um, axis=-1)
         mean = float(traced.mean()) if traced.size else 0.0
-        return f"{change}traces: mean {number(mean)} µm · max {number(_largest_um(picture))} µm"
+        return f"{change}traces: mean {number(mean)} µm · max {number(picture.largest_um)} µm"
     numbers = {"mean": volume_mean(norm, picture.grid), "max": float(norm.max())}
     uncertainty, u95_texts, factor = picture.uncertainty, dict.fromkeys(numbers, ""), ""
     if uncertainty is not None:

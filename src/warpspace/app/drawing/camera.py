@@ -124,6 +124,20 @@ def fit_camera(
     return CameraMemory(tuple(position), tuple(look_at), (0.0, 0.0, 1.0), np.deg2rad(fov_deg))
 
 
+def is_in_view(place: CameraMemory, points_mm: Array, aspect: float) -> bool:
+    """Check if all points are in the picture of a camera."""
+    backward = np.subtract(place.position, place.look_at)
+    backward = backward / np.linalg.norm(backward)
+    right = np.cross(place.up, backward)
+    right = right / np.linalg.norm(right)
+    up = np.cross(backward, right)
+    from_eye = points_mm.reshape(-1, 3) * SCENE_PER_MM - np.array(place.position)
+    depth = -from_eye @ backward
+    half = np.tan(place.fov_rad / 2.0) * np.array([aspect, 1.0]) * depth[:, None]
+    across = np.abs(from_eye @ np.stack([right, up], axis=1))
+    return bool((depth > 0.0).all() and (across <= half).all())
+
+
 def clipping(position: Array, points: Array, *, orthographic: bool) -> tuple[float, float]:
     distance = float(np.linalg.norm(position - points.reshape(-1, 3), axis=-1).max())
     return (0.02 * distance if orthographic else NEAR), max(FAR, 5.0 * distance)
@@ -133,6 +147,13 @@ def focus(state: AppState) -> tuple[object, ...]:
     """Return the properties that require a new camera: scene, chain, display of the machine."""
     chain, machine = state.scene.machine.chain, state.machine
     return Identity(state.origin), chain, machine.shown, state.shows_rotary
+
+
+def _drawn_mm(picture: LivePicture) -> Array:
+    if not picture.is_rotary:
+        return picture.drawn_mm
+    traces = (of.actual_mm.reshape(-1, 3) for of in picture.traces)
+    return np.concatenate([np.zeros((0, 3)), *traces])
 
 
 class TabCamera:
@@ -145,6 +166,7 @@ class TabCamera:
         self.reported_room: Room | None = None
         # several, since a slow page reports earlier ones late
         self._placements: tuple[CameraMemory, ...] = ()
+        self.has_followed = False  # whether it moved by itself for a larger box
 
     def choose(
         self, picture: LivePicture, view: str | None = None, lens: bool | None = None
@@ -189,9 +211,27 @@ class TabCamera:
 
     def take_room(self, room: Room, picture: LivePicture | None) -> None:
         """Record the size of the drawing; a camera that was not moved by hand fits it again."""
-        self.reported_room, now = room, self.remember()
-        if picture is not None and any(put.is_near(now) for put in self._placements):
+        self.reported_room = room
+        if picture is not None and not self.is_moved:
             self.fit(picture)
+
+    def loses(self, before: LivePicture, picture: LivePicture) -> bool:
+        """Check if what is drawn has left the view with a change."""
+        now, aspect = self.remember(), self.room.aspect
+        before_mm, drawn_mm = _drawn_mm(before), _drawn_mm(picture)
+        return is_in_view(now, before_mm, aspect) and not is_in_view(now, drawn_mm, aspect)
+
+    @property
+    def is_moved(self) -> bool:
+        """True if it was moved by hand, or to a stored view."""
+        now = self.remember()
+        return not any(put.is_near(now) for put in self._placements)
+
+    def follow(self, picture: LivePicture) -> CameraMemory:
+        """Return the view of the whole box, for the page to move there."""
+        now, fitted = self.remember(), self._fitted(picture)
+        self._placements, self.has_followed = (*self._placements[-PLACEMENTS:], now, fitted), True
+        return fitted
 
     def place(self, picture: LivePicture) -> None:
         """Move to the wanted view, else to one of the whole box."""
@@ -208,14 +248,15 @@ class TabCamera:
         self.orthographic, self._placements = bool(telephoto), ()
         self._clip(memory, np.array([memory.look_at]) / SCENE_PER_MM)
 
-    def fit(self, picture: LivePicture) -> None:
-        points, room = self._room_mm(picture), self.room
-        fitted = fit_camera(
-            points, room.aspect, VIEWS[self.view], self._fov_deg, margins=room.margins
-        )
-        before = self.remember()
+    def _fitted(self, picture: LivePicture) -> CameraMemory:
+        points, room, view = self._room_mm(picture), self.room, VIEWS[self.view]
+        fitted = fit_camera(points, room.aspect, view, self._fov_deg, margins=room.margins)
         self._clip(fitted, points)
-        self._stand_at(fitted)
+        return fitted
+
+    def fit(self, picture: LivePicture) -> None:
+        before, self.has_followed = self.remember(), False
+        self._stand_at(self._fitted(picture))
         self._placements = (*self._placements[-PLACEMENTS:], before, self.remember())
 
     def remember(self) -> CameraMemory:

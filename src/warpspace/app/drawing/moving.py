@@ -1,6 +1,5 @@
-"""The layer around the box: surroundings, machine, and the rotating table."""
+"""The layer around the box: surroundings, and the machine, which the player moves."""
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
@@ -12,13 +11,11 @@ from viser.transforms import SO3
 from warpspace.app.browser.page import Page
 from warpspace.app.drawing.around import GIZMO, draw_surroundings, program_point, turned_points
 from warpspace.app.drawing.colours import colour
+from warpspace.app.drawing.player import PROGRAM, Player
 from warpspace.app.drawing.shapes import SCENE_PER_MM, UNLIT, Nodes, SceneNode, Shapes, ball, lines
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import (
     drawn_bodies,
-    played_angle,
-    played_axis,
-    played_position,
     tool_point,
 )
 from warpspace.app.evaluation.scene_overlays import moved_place
@@ -30,12 +27,6 @@ from warpspace.geometry.colour import srgb_to_linear
 from warpspace.geometry.surfaces import triangulate
 from warpspace.kinematics import transforms
 from warpspace.units import Array
-
-STEP_S = 0.125  # between two pictures of a rotating table; each is sent to the page
-LONGEST_STEP_S = 0.5  # longer delays are skipped
-SPEEDS_DEG_S = (10.0, 30.0, 90.0)
-PROGRAM = "program"  # what plays, in place of the name of an axis
-PROGRAM_S = 20.0  # time of a whole program at the middle speed
 
 SLOT = (70, 78, 90)  # colour of the slots of tables
 BALL = 0.010  # marker of the tool point, relative to the longest edge
@@ -49,8 +40,8 @@ GIZMO_SIZE = 0.3  # relative to the longest edge
 def machine(picture: LivePicture, turned: Mapping[str, float]) -> Shapes:
     """Draw the bodies at the positions of the machine, deformed by its errors.
 
-    `turned` overrides positions, degrees, during an animation; its table is then drawn also where
-    the machine is hidden.
+    `turned` overrides positions, degrees or mm; a turned table is drawn also where the machine is
+    hidden.
     """
     is_shown, shapes = picture.state.machine.shown, dict[str, SceneNode | None]()
     if is_shown or turned or picture.is_rotary:
@@ -135,36 +126,26 @@ def _shadow(rectangle: tuple[float, ...]) -> GltfNode:
 
 
 class MovingLayer:
-    """Everything around the box, with an animation that the session advances."""
+    """Everything around the box, with the machine where the player moves it."""
 
-    def __init__(self, client: ClientHandle, page: Page, picture: LivePicture) -> None:
-        self._client = client
+    def __init__(
+        self, client: ClientHandle, page: Page, picture: LivePicture, player: Player
+    ) -> None:
+        self._client, self._player = client, player
         self._picture = picture
         self._around = Nodes(client.scene, page)
-        self._ghost, self._turning = Nodes(client.scene), Nodes(client.scene)
+        self._ghost, self._moved = Nodes(client.scene), Nodes(client.scene)
         self._ghost_of: object = None
-        self.position: dict[str, float] = {}  # of animated axes, degrees; empty while stopped
-        self.followers: dict[str, Callable[[], None]] = {}  # called after each step, by panel
-        self.axis: str | None = None  # the axis that plays, or `PROGRAM`
-        self.sample: float | None = None  # of the path of the program; None while stopped
-        self.speed_deg_s = SPEEDS_DEG_S[1]
         self.clamp: Callable[[str], None] = lambda _place: None  # called after a drag
-        self._turned_deg = 0.0
-        self._turned_at: float | None = None  # None while stopped
+        self._drawn_at: object = None  # positions of the player
+        player.followers["machine"] = self._follow
         self.show(picture)
 
     def show(self, picture: LivePicture) -> None:
-        """Draw a picture; a moved axis restarts the rotation at its new position."""
-        before, self._picture = self._picture.state, picture
-        now = picture.state
-        same = before.origin is now.origin and before.scene.machine is now.scene.machine
-        same &= before.part.program is now.part.program
-        if not same or before.positions != now.positions:
-            self._turned_at, self._turned_deg, self.sample = None, 0.0, None
-            self._stand({})
+        self._picture = picture
         self._around.draw({**self._gizmo(picture), **draw_surroundings(picture)})
         self._draw_ghost(picture)
-        self._draw_turning()
+        self._draw_moved()
 
     def _gizmo(self, picture: LivePicture) -> Shapes:
         if picture.part is None or not picture.state.part.moved:
@@ -194,80 +175,24 @@ class MovingLayer:
             self._ghost_of = of
             self._ghost.draw(ghost_machine(picture) if on else {})
 
-    def _draw_turning(self) -> None:
-        picture, position = self._picture, self.position
-        if self.sample is None:
-            shapes = turned_points(picture, position)
-        else:
-            shapes = program_point(picture, int(self.sample))
-        self._turning.draw({**shapes, **machine(picture, position)})
+    def _positions(self) -> tuple[dict[str, float], int | None]:
+        """Return the positions that the player has moved, and its sample of the program."""
+        path, sample = self._picture.path, self._player.step_of(PROGRAM)
+        if path is None or sample is None:
+            return self._player.angles_deg, None
+        sample = min(sample, len(path.of.line) - 1)
+        return path.of.axes_at(sample), sample
 
-    @property
-    def playing(self) -> bool:
-        return self._turned_at is not None
-
-    def play(self, on: bool | None, axis: str | None = None) -> None:
-        """Play an axis (True), pause (False), or return to the axis positions (None)."""
-        if on and axis == PROGRAM:
-            self.axis, self._turned_at = axis, time.monotonic()
-            path = self._picture.path
-            if self.sample is None or (path and self.sample >= len(path.of.line) - 1):
-                self.sample = 0.0
-            return
-        if on:
-            state = self._picture.state
-            self.axis, self.sample = axis or played_axis(state), None
-            at = self.position.get(self.axis or "")
-            self._turned_deg = played_angle(state, self.axis, at)
-            self._turned_at = time.monotonic()
-            return
-        self._turned_at = None
-        if on is None:
-            self._turned_deg, self.sample = 0.0, None
-            self._stand({}, drawn=True)
-        else:
-            self._moved()
-
-    def scrub(self, axis: str, at_deg: float) -> None:
-        """Move an axis to a position by hand, which ends playing."""
-        self._turned_at, self.sample = None, None
-        self._stand({**self.position, axis: at_deg}, drawn=True)
-
-    def scrub_program(self, sample: float) -> None:
-        """Move the machine to a sample of the path of the program; playing goes on from there."""
-        path = self._picture.path
-        if path is not None:
-            self.sample = min(max(sample, 0.0), len(path.of.line) - 1.0)
-            self._stand(path.of.axes_at(int(self.sample)), drawn=True)
-
-    def _moved(self) -> None:
-        for follow in self.followers.values():
-            follow()
-
-    @property
-    def wait_s(self) -> float | None:
-        """Time until the next picture of the animation; None while stopped."""
-        at = self._turned_at
-        return None if at is None else max(0.0, at + STEP_S - time.monotonic())
-
-    def turn(self) -> None:
-        now = time.monotonic()
-        since = min(now - (self._turned_at or now), LONGEST_STEP_S)
-        if self.axis == PROGRAM:
-            path, share = self._picture.path, since / PROGRAM_S * self.speed_deg_s / SPEEDS_DEG_S[1]
-            count = 0 if path is None else len(path.of.line)
-            sample = (self.sample or 0.0) + count * share
-            self._turned_at = now if sample < count - 1 else None
-            self.scrub_program(sample)
-            return
-        self._turned_deg = (self._turned_deg + self.speed_deg_s * since) % 360.0
-        self._turned_at = now
-        played = played_position(self._picture.state, self._turned_deg, self.axis)
-        self._stand({**self.position, **played}, drawn=True)
-
-    def _stand(self, position: dict[str, float], *, drawn: bool = False) -> None:
-        self.position = position
-        if drawn:
+    def _follow(self) -> None:
+        if self._drawn_at != self._positions():
             with self._client.atomic():
-                self._draw_turning()
-        self._moved()
+                self._draw_moved()
+
+    def _draw_moved(self) -> None:
+        picture, (positions, sample) = self._picture, self._positions()
+        self._drawn_at = positions, sample
+        if sample is None:
+            shapes = turned_points(picture, positions)
+        else:
+            shapes = program_point(picture, sample)
+        self._moved.draw({**shapes, **machine(picture, positions)})

@@ -122,6 +122,13 @@ class LivePicture(Picture):
         """Errors of all points of the traces, [n, 3], µm."""
         return np.concatenate([np.zeros((0, 3)), *(t.error_um.reshape(-1, 3) for t in self.traces)])
 
+    @property
+    def largest_um(self) -> float:
+        """Largest length of the errors of what is drawn, µm."""
+        if self.is_rotary:
+            return float(np.linalg.norm(self.traced_um, axis=-1).max(initial=0.0))
+        return float(self.field.norm_um.max())
+
     @cached_property
     def shown_values(self) -> Array:
         """Coloured values of what is drawn: of the volume, or of the traces."""

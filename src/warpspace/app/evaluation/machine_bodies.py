@@ -76,31 +76,6 @@ def played_axis(state: AppState) -> str | None:
     return next(iter(_turning_frames(state)[-2:]), None)
 
 
-def played_angle(state: AppState, axis: str | None, at_deg: float | None) -> float:
-    """Return the angle after which `played_position` is at a position of an axis, degrees."""
-    if axis is None or at_deg is None:
-        return 0.0
-    low, high = state.scene.machine.axes[axis].travel
-    start, span = state.positions.get(axis, low), high - low
-    return at_deg - start if span >= 360.0 else 180.0 * (at_deg - start) / (span or 1.0)
-
-
-def played_position(state: AppState, angle_deg: float, axis: str | None = None) -> dict[str, float]:
-    """Return the position of the animated axis after an angle, degrees, within its travel.
-
-    An axis without full rotation oscillates over its travel.
-    """
-    axis = axis or played_axis(state)
-    if axis is None:
-        return {}
-    low, high = state.scene.machine.axes[axis].travel
-    start, span = state.positions.get(axis, low) - low, high - low
-    if span >= 360.0:
-        return {axis: low + (start + angle_deg) % 360.0}
-    swing = (start + 2.0 * span * angle_deg / 360.0) % (2.0 * span)
-    return {axis: low + min(swing, 2.0 * span - swing)}
-
-
 def points_on_traces(picture: LivePicture, position: Mapping[str, float]) -> tuple[Array, Array]:
     """Interpolate the traced points at a position of the animated axis, [n, 3] each, mm."""
     interpolated: list[list[float]] = []

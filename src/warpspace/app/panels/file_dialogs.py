@@ -200,6 +200,14 @@ class FilesDialog(JobDialog):
         ending = f"_{kind or 'figure'}.png"
         self.make("Figure", ending, lambda picture, job: draw(picture, kind, job))
 
+    @on(do.SaveAnimation)
+    def save_animation(self, state: AppState, action: do.SaveAnimation) -> AppState:
+        draw, motion = self.context.services.draw_animation, action.motion
+        write = partial(self.make, "Animation", f"_{motion}.webp",
+                        lambda picture, job: draw(picture, motion, job))  # fmt: skip
+        self.context.call_soon(write)
+        return replace(state, page=replace(state.page, window=self.name))  # its progress
+
     @on(do.Signal.SAVE_VIEW, later=True)
     def save_view(self) -> None:
         client, camera = self.context.client, self.context.camera

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import starmap
 
 from markupsafe import Markup
@@ -25,7 +24,7 @@ from warpspace.bodies.mesh_files import check_meshes
 from warpspace.machine.definition import BodySource, Gantry
 from warpspace.picture.formatting import spell_at, spell_point
 from warpspace.picture.traces import TraceLine, evaluate_axis_motion, motion_lines
-from warpspace.units import MICROMETRE, MINUS
+from warpspace.units import MICROMETRE
 
 OPEN_MESH = "A mesh of this machine is not watertight; it is drawn unchanged."
 
@@ -84,47 +83,11 @@ class RotarySection(panel.Section):
     sentence = "Error motion of traced points during rotation of an axis (ISO 230-7)"
 
     def body(self, picture: LivePicture) -> Markup:
-        state, stage = picture.state, self.context.stage
-        axis, playing = played_axis(state), stage is not None and stage.playing
-        position = {} if stage is None else stage.position
+        state, axis = picture.state, played_axis(picture.state)
         if axis is None:
             return panel.quiet("This machine has no rotary axis.")
-        if stage is not None:
-            stage.followers[self.name] = self._follow
-        buttons = [button("Pause" if playing else f"Turn {axis}", do.Signal.TURN_ROTARY,
-                          hint="Animate the traced points")]  # fmt: skip
-        if playing or position:
-            hint = "Stop and return to the axis position"
-            buttons.append(button("Stop", do.Signal.STOP_ROTARY, hint=hint))
-        if axis in position and not playing:
-            hint = "Move the axis to the paused position"
-            move = do.SetLeaf(f"positions.{axis}", str(round(position[axis])))
-            buttons.append(button("Move axes here", move, hint=hint))
-        return join((
-            panel.actions(*buttons),
-            fill('<p data-piece="rotary.angle" class="ws-tiny"></p>'),
-            _trace(picture), _points(state, axis),
-        ))  # fmt: skip
-
-    def _follow(self) -> None:
-        state, stage = self.context.state, self.context.stage
-        if stage is not None and self.is_visible(state) and self.is_open(state):
-            text = ", ".join(f"{axis} = {at:.0f}°" for axis, at in stage.position.items())
-            self.context.page.put({"rotary.angle": str(tag("span", text.replace("-", MINUS)))})
-
-    @panel.on(do.Signal.TURN_ROTARY)
-    def turn(self, state: AppState) -> None:
-        if self.context.stage is not None:
-            self._play(not self.context.stage.playing)
-
-    @panel.on(do.Signal.STOP_ROTARY)
-    def stop(self, state: AppState) -> None:
-        self._play(None)
-
-    def _play(self, on: bool | None) -> None:
-        if self.context.stage is not None:
-            self.context.call_soon(partial(self.context.stage.play, on))
-            self.context.call_soon(self.rerender)
+        play = button(f"Play {axis}", do.Input.PLAY(axis), hint="Animate the traced points (P)")
+        return join((panel.actions(play), _trace(picture), _points(state, axis)))
 
 
 def _trace(picture: LivePicture) -> Markup:

@@ -13,14 +13,15 @@ from warpspace.app.browser.html import EMPTY, button, fill, join, linked, tag, t
 from warpspace.app.documents.offline_page import step_words
 from warpspace.app.documents.scene_file import reopened, view_of
 from warpspace.app.drawing.camera import CameraMemory
+from warpspace.app.drawing.player import STORY
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import explain_point, pick_worst, with_picked
-from warpspace.app.panels.panel import Panel, Refresh, actions, on, quiet, setting, tiny
+from warpspace.app.panels.panel import Context, Panel, Refresh, actions, on, quiet, setting, tiny
 from warpspace.app.state.app_state import AppState, Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.tree import leaves, set_leaf, stored
 from warpspace.exceptions import WarpspaceError
-from warpspace.machine.limits import MAX_NOTE_TEXT, MAX_REPLIES
+from warpspace.machine.limits import MAX_NOTE_TEXT, MAX_NOTES, MAX_REPLIES
 from warpspace.scene.notes import TOLERANCES, Note, NoteAnchor, Pair, Reply, story, with_note
 from warpspace.scene.text_files import one_line
 from warpspace.units import spell_short
@@ -370,45 +371,67 @@ GLIDE_MS = 600  # from step to step
 
 
 class StoryPanel(Panel):
-    """The player of a story; it changes the displayed state only."""
+    """The steps of a story, as the player moves it; they change the displayed state only."""
 
     name = "story"
     refresh = Refresh.IMMEDIATE
-    _number, _step_html = 0, EMPTY  # of the present step; empty while none is played
+    _number: int | None = None  # of the present step; None while no story is shown
+    _step_html = EMPTY
     _camera: CameraMemory | None = None  # before the story
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        context.player.followers[self.name] = self._follow
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         return {"story": self._step_html}
 
-    @on(do.Signal.START_STORY)
-    def start(self, state: AppState) -> None:
-        context, notes = self.context, story(state.review)
-        if not notes:
-            context.notify("No story", "Add notes to the story first")
-        elif not self._step_html:
-            self._camera = context.camera.remember()
-            context.page.call("story", True)
-            self._show_step(state, notes, 0)
+    @on(do.Signal.START_STORY, later=True)
+    def start(self) -> None:
+        if not story(self.context.store.state.review):
+            self.context.notify("No story", "Add notes to the story first")
+        elif self._number is None:
+            self.context.player.move(STORY, 0.0)
+
+    @on(do.Signal.NEXT_STEP, later=True)
+    def show_next(self) -> None:
+        self._move_by(1)
+
+    @on(do.Signal.PREVIOUS_STEP, later=True)
+    def show_previous(self) -> None:
+        self._move_by(-1)
+
+    @on(do.Signal.FIRST_STEP, later=True)
+    def show_first(self) -> None:
+        self._move_by(-MAX_NOTES)
+
+    @on(do.Signal.LAST_STEP, later=True)
+    def show_last(self) -> None:
+        self._move_by(MAX_NOTES)
 
     @on(do.Signal.END_STORY)
     def end(self, state: AppState) -> None:
-        if self._step_html:
-            self._step_html, self.context.story_state = EMPTY, None
-            self.context.page.call("story", False)
-            self.context.fly(self._camera, 0)
+        self.context.player.stop(STORY)
 
-    @on(do.Signal.NEXT_STEP)
-    def show_next(self, state: AppState) -> None:
-        self._step_by(state, 1)
+    def _move_by(self, n_steps: int) -> None:
+        if self._number is not None:
+            self.context.player.move(STORY, float(self._number + n_steps))
 
-    @on(do.Signal.PREVIOUS_STEP)
-    def show_previous(self, state: AppState) -> None:
-        self._step_by(state, -1)
-
-    def _step_by(self, state: AppState, by: int) -> None:
-        notes, to = story(state.review), self._number + by
-        if self._step_html and 0 <= to < len(notes):
-            self._show_step(state, notes, to)
+    def _follow(self) -> None:
+        context, number, before = self.context, self.context.player.step_of(STORY), self._number
+        if number == before:
+            return
+        self._number = number
+        if number is None:
+            self._step_html, context.story_state = EMPTY, None
+            context.page.call("story", False)
+            context.fly(self._camera, 0)
+            return
+        if before is None:
+            self._camera = context.camera.remember()
+            context.page.call("story", True)
+        now = context.store.state if context.story_state else context.state
+        self._show_step(now, story(now.review), number)
 
     def _show_step(self, now: AppState, notes: Sequence[Note], number: int) -> None:
         context, note, camera, problem = self.context, notes[number], None, ""
@@ -422,12 +445,5 @@ class StoryPanel(Panel):
             story_state, problem = before, str(error)
         context.notes += story_state.notes
         context.story_state = replace(story_state.without_notes(), page=before.page)
-        self._number = number
-        self._step_html = step_words(now.resulting_scene(), notes, number, problem) + actions(
-            button("←", do.Signal.PREVIOUS_STEP, hint="Previous step (←)",
-                   aria_label="Previous step", disabled=number == 0),
-            button("→", do.Signal.NEXT_STEP, kind="main", hint="Next step (→)",
-                   aria_label="Next step", disabled=number == len(notes) - 1),
-            button("End", do.Signal.END_STORY, hint="Return to the previous view (Esc)"),
-        )  # fmt: skip
+        self._step_html = step_words(now.resulting_scene(), notes, number, problem)
         context.fly(camera, GLIDE_MS)

@@ -12,6 +12,7 @@ from warpspace.analysis.registry import entries
 from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, join, rows, tag, text_box, upload_button
+from warpspace.app.drawing.player import EXAGGERATION
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import machine_editor, overlay
 from warpspace.app.panels.analysis_panel import AnalysisPanel
@@ -164,7 +165,8 @@ COMMANDS = (
     Command("Nominal box on or off", do.Input.TOGGLE_DISPLAY("ghost"), ("b",)),
     Command("Draw the volume", do.ShowDrawing("volume"), ("v",)),
     Command("Draw the rotary axes", do.ShowDrawing("rotary"), ("r",), "table traces"),
-    Command("Play or pause the rotary axis", do.Input.PLAY(), keys=("p",)),
+    Command("Play or pause", do.Input.PLAY(), ("p",), "table program animate"),
+    Command("Play the exaggeration", do.Input.PLAY(EXAGGERATION), (), "true scale animate"),
     Command("Rotary traces on or off", do.Input.TOGGLE_DISPLAY("traces"), ("c",)),
     Command("Dark mode on or off", do.Input.TOGGLE_DISPLAY("dark"), ("m",)),
     Command("Set all errors to zero", do.Signal.ZERO_ERRORS, keys=("ctrl+alt+0",)),

@@ -30,13 +30,14 @@ from warpspace.app.browser.page import Page
 from warpspace.app.documents.output_services import CancelledError, Services
 from warpspace.app.documents.scene_file import MOST_OPENED, SceneList
 from warpspace.app.drawing.camera import CameraMemory, TabCamera, focus
-from warpspace.app.drawing.moving import MovingLayer
+from warpspace.app.drawing.player import Player, Track, find_tracks
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.store import StateStore, Update
 from warpspace.app.state.tree import LONGEST, leaves, spell, value
 from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.scene.notes import story
 
 MOST_FILES = 16  # that may wait for the session; likewise jobs
 PAUSE_S = 0.1  # without changes: longer than between two moves of a drag
@@ -58,7 +59,7 @@ class Context:
         self.events: deque[do.AnyAction] = deque()
         self.store, self.scenes, self.services = store, scenes, services
         self.picture: LivePicture | None = None
-        self.stage: MovingLayer | None = None
+        self.player = Player(self.find_tracks)
         # set by the display, to be called in the session: render a panel again at once; note that
         # the page has closed its dialog; restart the idle time, with panels to render after it
         self.rerender: Callable[[Panel], None] = lambda _: None
@@ -103,6 +104,12 @@ class Context:
 
         at = self.changed_at if self.held_since is None else self.held_since
         self.notes += self.store.apply(update_tab, by=self.mark_changed, at=at)
+
+    def find_tracks(self, picture: LivePicture | None = None) -> Mapping[str, Track]:
+        """List what the player can play in a picture, by default the present one."""
+        picture = picture or self.picture
+        steps = story(self.store.state.review)
+        return {} if picture is None else find_tracks(picture, len(steps))
 
     def wake(self) -> None:
         self._wake.set()

@@ -1,6 +1,7 @@
-"""The playback bar of the drawing of the rotary axes: scrub, play, speed."""
+"""The playback bar: play, pause, scrub and speed of whatever the drawing can play."""
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from markupsafe import Markup
@@ -8,13 +9,21 @@ from markupsafe import Markup
 from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, fill, join, number, tag
-from warpspace.app.browser.incoming import index_of
-from warpspace.app.drawing.moving import PROGRAM, SPEEDS_DEG_S, MovingLayer
+from warpspace.app.drawing.player import (
+    AXIS_DEG_S,
+    EXAGGERATION,
+    NO_AXES,
+    PROGRAM,
+    SPEEDS,
+    STORY,
+    Track,
+)
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine_bodies import rotary_axes
-from warpspace.app.panels.panel import Panel, Refresh, on
+from warpspace.app.evaluation.machine_bodies import played_axis
+from warpspace.app.panels.panel import Context, Panel, Refresh, on
 from warpspace.app.state.app_state import AppState
 from warpspace.machine.axes import parameter
+from warpspace.picture.formatting import spell_factor
 from warpspace.units import MINUS
 
 MOST_LETTERS = 60  # of a line of the program
@@ -26,96 +35,144 @@ def share_words(share: float) -> str:
 
 
 class PlaybackPanel(Panel):
-    """A slider and a play button for each rotary axis that is drawn."""
+    """The bar: one track, or all axes in the drawing of the rotary axes."""
 
     name = "playback"
     refresh = Refresh.IMMEDIATE
 
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        context.player.followers[self.name] = self.rerender
+
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        state, stage = picture.state, self.context.stage
-        if not picture.is_rotary and picture.path is None:
+        player = self.context.player
+        if not (picture.is_rotary or picture.path is not None or player.chosen):
             return {"playback": EMPTY}
-        if stage is not None:
-            stage.followers[self.name] = self.rerender
-        speed = SPEEDS_DEG_S[1] if stage is None else stage.speed_deg_s
-        middle, rotary = SPEEDS_DEG_S[1], picture.is_rotary
-        speeds = {f"{s:g}": f"{s:g} °/s" if rotary else f"{s / middle:.1g} ×" for s in SPEEDS_DEG_S}
-        bar = (
-            *((_row(state, stage, axis) for axis in rotary_axes(state)) if picture.is_rotary
-              else (_program(picture, stage),)),
-            html.choice(do.Input.SET_SPEED(), f"{speed:g}", speeds, label="Speed"),
-            button("Reset", do.Signal.STOP_PLAYBACK, kind="quiet",
-                   hint="Return to the axis positions of the scene"),
+        tracks = self.context.find_tracks(picture)
+        chosen = self._chosen(tracks, rotary=picture.is_rotary)
+        if not chosen:
+            return {"playback": EMPTY}
+        axes = [name for name in tracks if name not in NO_AXES]
+        row_names = axes if chosen in axes and picture.is_rotary else [chosen]
+        rows = [self._row(picture, name, tracks[name]) for name in row_names]
+        return {
+            "playback": tag("div", join((*rows, *self._buttons(picture.state, tracks, chosen))))
+        }
+
+    def _chosen(self, tracks: Mapping[str, Track], *, rotary: bool) -> str:
+        """Return the track of the bar: the selected one, or that of the drawing."""
+        chosen, axes = self.context.player.chosen, [name for name in tracks if name not in NO_AXES]
+        if chosen in tracks:
+            return chosen
+        if rotary and axes:
+            return axes[-1]
+        return next((name for name in (PROGRAM, EXAGGERATION) if name in tracks), "")
+
+    def _row(self, picture: LivePicture, name: str, track: Track) -> Markup:
+        player, subject = self.context.player, name if name not in NO_AXES else f"the {name}"
+        at, plays = min(player.at.get(name, track.start), track.high), player.playing == name
+        text, extra = self._words(picture, name, at, int(track.high) + 1)
+        word = "Pause" if plays else "Play"
+        ends = track.to_slider(track.low), track.to_slider(track.high)
+        return fill(
+            '<div class="ws-turn">{play}<b>{label}</b>{slider}<span>{text}</span></div>{extra}',
+            play=button(word, do.Input.PLAY(name), kind="quiet", aria_label=f"{word} {subject}",
+                        data_key=f"play-{name}", hint=f"{word} {subject} (P)"),
+            label=name if name not in NO_AXES else name.capitalize(), text=text, extra=extra,
+            slider=html.slider(do.Scrub(name), track.to_slider(at), *ends, track.step,
+                               label=f"Position of {subject}", text=text),
         )  # fmt: skip
-        return {"playback": tag("div", join(bar))}
+
+    def _words(self, picture: LivePicture, name: str, at: float, count: int) -> tuple[str, Markup]:
+        """Format the position of a track, and what follows its slider."""
+        if name == EXAGGERATION:
+            return spell_factor(float(f"{at:.3g}")), EMPTY
+        if name == STORY:
+            return f"{int(at) + 1} of {count}", EMPTY
+        if name == PROGRAM:
+            return _program_words(picture, int(at))
+        player, path = self.context.player, do.SetLeaf(f"positions.{name}", str(round(at)))
+        text, stands = f"{at:.0f}°".replace("-", MINUS), name in player.at and not player.playing
+        hint = "Move the axis to the paused position"
+        move = button("Move axes here", path, kind="quiet", hint=hint)
+        return text, move if stands else EMPTY
+
+    def _buttons(self, state: AppState, tracks: Mapping[str, Track], chosen: str) -> list[Markup]:
+        player, is_axis = self.context.player, chosen not in NO_AXES
+        labels = {f"{s:.2g}": f"{AXIS_DEG_S * s:g} °/s" if is_axis else f"{s:.1g} ×"
+                  for s in SPEEDS}  # fmt: skip
+        buttons = [html.choice(do.Input.SET_SPEED(), f"{player.speed:.2g}", labels, label="Speed")]
+        if player.chosen == STORY:
+            return [
+                button("←", do.Signal.PREVIOUS_STEP, kind="quiet", hint="Previous step (←)",
+                       aria_label="Previous step"),
+                button("→", do.Signal.NEXT_STEP, kind="quiet", hint="Next step (→)",
+                       aria_label="Next step"),
+                *buttons,
+                button("End", do.Signal.END_STORY, kind="quiet",
+                       hint="Return to the previous view (Esc)"),
+            ]  # fmt: skip
+        names = {name: name for name in tracks if name != STORY}
+        if len(names) > 1:
+            buttons.insert(0, html.choice(do.Input.CHOOSE_TRACK(), chosen, names, label="Play"))
+        motions = {played_axis(state): "rotation"}
+        if not state.shows_rotary:
+            motions[EXAGGERATION] = "exaggeration"
+        if chosen in motions:
+            buttons.append(button("Export", do.SaveAnimation(motions[chosen]), kind="quiet",
+                                  hint="Save as an animated WebP"))  # fmt: skip
+        hint = "Return to the state of the scene"
+        return [*buttons, button("Reset", do.Signal.STOP_PLAYBACK, kind="quiet", hint=hint)]
 
     @on(do.Input.PLAY)
-    def play(self, state: AppState, axis: str) -> None:
-        stage, axes = self.context.stage, _played(state)
-        if stage is not None:
-            axis = next((a for a in (axis, stage.axis) if a in axes), axes[-1])
-            plays = not (stage.playing and stage.axis == axis)
-            self.context.call_soon(lambda: stage.play(plays, axis))
+    def play(self, state: AppState, name: str) -> None:
+        player, tracks = self.context.player, self.context.find_tracks()
+        name = name if name in tracks else self._chosen(tracks, rotary=state.shows_rotary)
+        toggle = player.pause if name == player.playing else partial(player.play, name)
+        self.context.call_soon(toggle)
 
-    @on(do.Signal.STOP_PLAYBACK)
-    def stop(self, state: AppState) -> None:
-        if (stage := self.context.stage) is not None:
-            self.context.call_soon(lambda: stage.play(None))
+    @on(do.Signal.STOP_PLAYBACK, later=True)
+    def stop(self) -> None:
+        self.context.player.stop()
 
-    @on(do.Input.SET_SPEED)
-    def set_speed(self, state: AppState, speed: str) -> None:
-        speeds = {f"{at:g}": at for at in SPEEDS_DEG_S}
-        if self.context.stage is not None and speed in speeds:
-            self.context.stage.speed_deg_s = speeds[speed]
+    @on(do.Input.SET_SPEED, later=True)
+    def set_speed(self, name: str) -> None:
+        speeds, player = {f"{speed:.2g}": speed for speed in SPEEDS}, self.context.player
+        player.speed = speeds.get(name, player.speed)
+        self.rerender()
 
-    @on(do.Scrub)
-    def scrub(self, state: AppState, action: do.Scrub) -> None:
-        stage, axis = self.context.stage, action.axis
-        if stage is None or axis not in _played(state):
-            return
-        if axis == PROGRAM:
-            path = self.context.picture and self.context.picture.path
-            sample = index_of(action.value, len(path.error_um)) if path else None
-            if sample is not None:
-                self.context.call_soon(lambda: stage.scrub_program(sample))
-        elif (at := _clamped(state, axis, action.value)) is not None:
-            self.context.call_soon(lambda: stage.scrub(axis, at))
+    @on(do.Input.CHOOSE_TRACK, later=True)
+    def choose_track(self, name: str) -> None:
+        track = self.context.find_tracks().get(name)
+        if track is not None and name != STORY:
+            self.context.player.move(name, self.context.player.at.get(name, track.start))
 
-    @on(do.Signal.SHOW_WORST_BLOCK)
-    def show_worst(self, state: AppState) -> None:
-        stage, path = self.context.stage, self.context.picture and self.context.picture.path
-        if stage is not None and path and PROGRAM in _played(state):
-            worst = int(np.argmax(np.linalg.norm(path.error_um, axis=1)))
-            self.context.call_soon(lambda: stage.play(False))
-            self.context.call_soon(lambda: stage.scrub_program(worst))
+    @on(do.Scrub, later=True)
+    def scrub(self, action: do.Scrub) -> None:
+        track, at = self.context.find_tracks().get(action.axis), _read_number(action.value)
+        if track is not None and at is not None:
+            self.context.player.move(action.axis, track.from_slider(at))
+
+    @on(do.Signal.SHOW_WORST_BLOCK, later=True)
+    def show_worst(self) -> None:
+        path = self.context.picture and self.context.picture.path
+        if path:
+            lengths = np.linalg.norm(path.error_um, axis=1)
+            self.context.player.move(PROGRAM, float(np.argmax(lengths)))
 
 
-def _played(state: AppState) -> tuple[str, ...]:
-    return rotary_axes(state) if state.shows_rotary else (PROGRAM,)
-
-
-def _program(picture: LivePicture, stage: MovingLayer | None) -> Markup:
-    """Render the slider of the program, with line, error and its main cause."""
+def _program_words(picture: LivePicture, sample: int) -> tuple[str, Markup]:
+    """Format the line of the program; and its text, its error and the main cause of this."""
     path = picture.path
-    assert path is not None  # noqa: S101 - checked by the panel
-    sample = 0 if stage is None or stage.sample is None else int(stage.sample)
-    sample = min(sample, len(path.error_um) - 1)
-    plays = stage is not None and stage.playing and stage.axis == PROGRAM
-    line, text = int(path.of.line[sample]), (picture.state.part.program or "").splitlines()
-    code = text[line - 1][:MOST_LETTERS] if 0 < line <= len(text) else ""
-    words = f"line {line}"
-    return fill(
-        '<div class="ws-turn">{play}<b>Program</b>{slider}<span>{words}</span>{worst}</div>'
-        '<div class="ws-line"><code>{code}</code> {error}</div>',
-        play=button("Pause" if plays else "Play", do.Input.PLAY(PROGRAM), kind="quiet",
-                    aria_label=f"{'Pause' if plays else 'Play'} the program",
-                    data_key="play-program", hint="Move the machine along the path (P)"),
-        slider=html.slider(do.Scrub(PROGRAM), sample, 0, len(path.error_um) - 1, 1.0,
-                           label="Position in the program", text=words),
-        words=words, code=code, error=_error_words(picture, sample),
-        worst=button("Worst", do.Signal.SHOW_WORST_BLOCK, kind="quiet",
-                     hint="Go to the largest error"),
-    )  # fmt: skip
+    assert path is not None  # noqa: S101 - checked by `find_tracks`
+    line, lines = int(path.of.line[sample]), (picture.state.part.program or "").splitlines()
+    code = lines[line - 1][:MOST_LETTERS] if 0 < line <= len(lines) else ""
+    worst = button(
+        "Worst", do.Signal.SHOW_WORST_BLOCK, kind="quiet", hint="Go to the largest error"
+    )
+    error = _error_words(picture, sample)
+    body = fill('{}<div class="ws-line"><code>{}</code> {}</div>', worst, code, error)
+    return f"line {line}", body
 
 
 def _error_words(picture: LivePicture, sample: int) -> str:
@@ -134,29 +191,10 @@ def _error_words(picture: LivePicture, sample: int) -> str:
     return f"{words}, {share_words(float(along[first]) / length)} because {cause}"
 
 
-def _clamped(state: AppState, axis: str, value: str) -> float | None:
-    """Read a position sent by the page, degrees, within the travel; None where it is no number."""
-    low, high = state.scene.machine.axes[axis].travel
+def _read_number(text: str) -> float | None:
+    """Parse a number sent by the page; None where it is none."""
     try:
-        at = float(value[:40])
+        value = float(text[:40])
     except ValueError:
         return None
-    return min(max(at, low), high) if at == at else None  # noqa: PLR0124 - not a number
-
-
-def _row(state: AppState, stage: MovingLayer | None, axis: str) -> str:
-    low, high = state.scene.machine.axes[axis].travel
-    at = state.positions.get(axis, 0.0)
-    if stage is not None:
-        at = stage.position.get(axis, at)
-    plays = stage is not None and stage.playing and stage.axis == axis
-    text = f"{at:.0f}°".replace("-", MINUS)
-    return fill(
-        '<div class="ws-turn">{play}<b>{axis}</b>{slider}<span>{text}</span></div>',
-        play=button("Pause" if plays else "Play", do.Input.PLAY(axis), kind="quiet",
-                    aria_label=f"{'Pause' if plays else 'Play'} {axis}", data_key=f"play-{axis}",
-                    hint=f"{'Pause' if plays else 'Turn'} {axis} (P)"),
-        axis=axis, text=text,
-        slider=html.slider(do.Scrub(axis), at, low, high, 1.0, label=f"Position of {axis}",
-                           text=text),
-    )  # fmt: skip
+    return value if value == value else None  # noqa: PLR0124 - not a number

@@ -19,7 +19,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from typing import Any
 
@@ -30,6 +30,7 @@ from warpspace.app.browser.viser_private import queued
 from warpspace.app.drawing.box import BoxLayer, rise_script
 from warpspace.app.drawing.camera import focus
 from warpspace.app.drawing.moving import MovingLayer
+from warpspace.app.drawing.player import EXAGGERATION
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_model import DrawnScale, LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -140,7 +141,8 @@ def _key(panel: Panel, picture: LivePicture) -> object:
 logger = logging.getLogger(__name__)
 TOKEN_WAIT_S = 0.25  # the first picture waits for the token of a tab that reconnects
 MOST_QUEUED, BEHIND_S = 4, 0.02  # messages to a slow page, and the wait for it to read them
-RESCALE_MS = 250  # animation of the box at the end of a drag
+RESCALE_MS, FOLLOW_MS = 250, 600  # animations: of the box after a drag, of the camera to a box
+OUT_OF_VIEW = "The box is larger than the view"
 ANSWER_S = 1.0  # after which a page that does not report its drawing is sent the surroundings
 _TURNS: deque[object] = deque()  # of tabs whose picture is being made, or waits
 _CHANGED = threading.Condition()
@@ -190,6 +192,7 @@ class Session:
         # scales of the drawing where they are not those of its state; the picture as a drag began
         self._scale: DrawnScale | None = None
         self._drag_start: LivePicture | None = None
+        self._in_view: LivePicture | None = None  # the latest that `_keep_in_view` has checked
         self._failing = set[object]()  # panels and layers that fail in any state
         self._is_identified = False  # whether the page has sent its token
         self._surroundings_due_at: float | None = None  # at the latest
@@ -216,6 +219,7 @@ class Session:
 
     def _run(self) -> None:
         self.use(self.context.store)
+        self.context.player.followers["session"] = self.context.wake
         try:
             self.run_guarded(self._build)
             while not self._stopped.is_set():
@@ -227,11 +231,11 @@ class Session:
                 pointer.hide()
 
     def _turn(self) -> None:
-        due_at, stage = self._surroundings_due_at, self.context.stage
+        due_at, player = self._surroundings_due_at, self.context.player
         waits = (
             self.display.scheduler.due_in_s,
             None if due_at is None else max(0.0, due_at - time.monotonic()),
-            None if stage is None else stage.wait_s,
+            player.wait_s,
         )
         changed = self.context.wait(min((wait for wait in waits if wait is not None), default=None))
         while queued(self._client) > MOST_QUEUED and not self._stopped.wait(BEHIND_S):
@@ -244,8 +248,8 @@ class Session:
         due_at = self._surroundings_due_at
         if due_at is not None and time.monotonic() >= due_at:
             self.run_guarded(partial(self.draw_surroundings, picture))
-        if stage is not None and stage.wait_s == 0.0:
-            self.run_guarded(stage.turn)
+        if player.wait_s == 0.0:
+            self.run_guarded(player.turn)
         if self.display.scheduler.due_in_s == 0.0:
             self.run_guarded(partial(self._settle, picture))
 
@@ -317,6 +321,7 @@ class Session:
     def _open(self, picture: LivePicture) -> None:
         context = self.context
         self._shown = self._settled = self._checkpoint()
+        self._in_view = picture
         with context.page.batch():
             self._set_theme(picture)
             context.page.call("title", picture.state.scene.title)
@@ -335,9 +340,9 @@ class Session:
         context = self.context
         try:
             with context.page.batch():
-                context.stage = MovingLayer(self._client, context.page, picture)
-                context.stage.clamp = lambda place: context.send(do.SetLeaf("part.place", place))
-                self.display.add(picture, [context.stage])
+                layer = MovingLayer(self._client, context.page, picture, context.player)
+                layer.clamp = lambda place: context.send(do.SetLeaf("part.place", place))
+                self.display.add(picture, [layer])
                 context.page.call("stage", "open")
         except Exception as error:
             if not self._reduce(error):
@@ -372,6 +377,7 @@ class Session:
             context.held_since = context.changed_at if is_held else None
         if action is do.Signal.RISE and self.context.picture is not None:
             self.context.page.run_script(rise_script(self.context.picture))
+        self.context.player.is_still |= action is do.Signal.REDUCE_MOTION
         if not isinstance(action, do.TabHere) or self._is_identified:
             return
         self._is_identified = True
@@ -398,6 +404,7 @@ class Session:
         now, state, picture = self._checkpoint(), self.state, context.picture
         if picture is None:  # the page could not be built
             return
+        context.player.follow(picture.state, state)
         before, self._scale = self._scale, self._drawn_scale(state)
         if context.camera.wanted and focus(picture.state) == focus(state):
             context.camera.place(picture)
@@ -406,13 +413,15 @@ class Session:
                 context.page.run_script(f"warpspaceMesh.next = {RESCALE_MS};")
             try:
                 with turn():
-                    shown = self._live.evaluate(state, self._scale)
-                    self._show(shown, picture, force=bool(notes))
+                    evaluated = self._live.evaluate(state, self._scale)
+                    self._show(evaluated, picture, force=bool(notes))
             except Exception as error:
                 if not self._revert(error, now, self._shown):
                     raise
                 self.run_guarded(partial(self._show, picture, picture, force=True))
                 state, now, notes = picture.state, self._shown, []
+            else:
+                self._keep_in_view(evaluated)
             self._shown = now
         controls = [str(action) for action in actions if hasattr(action, "value")]
         if controls and (notes or state is picture.state):
@@ -425,7 +434,23 @@ class Session:
         start = self._drag_start
         if start is not None and same_scales(start.state, state):
             return DrawnScale(start.exaggeration, start.scale)
-        return None
+        factor = self.context.player.at.get(EXAGGERATION)
+        return None if factor is None else DrawnScale(factor)
+
+    def _keep_in_view(self, picture: LivePicture) -> None:
+        """Move the camera back where the box leaves the picture; ask where it was set by hand."""
+        context, camera = self.context, self.context.camera
+        if self._scale is not None or context.story_state is not None:
+            return
+        before, self._in_view = self._in_view or picture, picture
+        if focus(before.state) != focus(picture.state):
+            return
+        is_lost, is_moved = camera.loses(before, picture), camera.is_moved
+        is_rescaled = picture.exaggeration != before.exaggeration
+        if not is_moved and (is_lost or (camera.has_followed and is_rescaled)):
+            context.page.call("fly", asdict(camera.follow(picture)), FOLLOW_MS)
+        elif is_lost:
+            context.page.call("toast", "warning", OUT_OF_VIEW, "", ["Fit view", do.Signal.FIT_VIEW])
 
     def _show(self, picture: LivePicture, before: LivePicture, *, force: bool) -> None:
         context = self.context
