@@ -27,7 +27,7 @@ from warpspace.app.evaluation import compare
 from warpspace.app.evaluation.cache import exclusive_work
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import block_html, result_html
-from warpspace.app.panels.file_dialogs import PLAIN
+from warpspace.app.panels.file_dialogs import PLAIN, limit_words
 from warpspace.app.panels.panel import (
     Context,
     Job,
@@ -37,7 +37,7 @@ from warpspace.app.panels.panel import (
     alert,
     details,
     on,
-    setting,
+    quiet,
 )
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import LONGEST, option_values, read_form
@@ -238,7 +238,7 @@ class AnalysisPanel(Section):
     def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
         options = [option for option in self.shown_options(state) if option.name not in OF_STATE]
         if "limit_um" in {option.name for option in self.shown_options(state)}:
-            controls = setting(state, "specification.limit_um") + controls
+            controls = quiet(f"{limit_words(state)}: see the heading.") + controls
         if not options and not controls:
             return EMPTY
         values = self.values(state)

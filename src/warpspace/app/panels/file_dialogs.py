@@ -262,6 +262,11 @@ ALWAYS = (
 )
 
 
+def limit_words(state: AppState) -> str:
+    limit_um = state.specification.limit_um
+    return "No limit is set" if limit_um is None else f"Limit: {limit_um:g} µm"
+
+
 class ReportDialog(JobDialog):
     name, title = "report", "Report"
 
@@ -271,8 +276,6 @@ class ReportDialog(JobDialog):
         if compared is not None and transfers.has_sheet(picture):
             a, b = compared.titles
             subject = f"Comparison of A, {a}, with B, {b}."
-        limit_um = picture.state.specification.limit_um
-        limit = "No limit is set" if limit_um is None else f"Limit: {limit_um:g} µm"
         added = [
             tag(
                 "li", join((f"{title} ", button("Remove", do.RemoveFromReport(index), kind="link")))
@@ -283,7 +286,7 @@ class ReportDialog(JobDialog):
         name = picture.state.page.author
         author = text_box(do.SetLeaf("page.author"), name, id="ws-report-author")
         return join((
-            tag("p", f"{subject} {limit}."),
+            tag("p", f"{subject} {limit_words(picture.state)}."),
             field("Author", author, "report.author"),
             setting(picture.state, "page.questions"),
             actions(button("Write HTML", do.WriteReport(".html"), kind="main",
