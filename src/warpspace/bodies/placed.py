@@ -11,7 +11,7 @@ from warpspace.bodies.frame import generate_bodies
 from warpspace.bodies.mesh import Body
 from warpspace.bodies.mesh_files import machine_meshes
 from warpspace.bodies.schematic import BODY_FILE, build_layout, read_bodies
-from warpspace.bodies.shading import Surface, shade_bodies
+from warpspace.bodies.shading import ShadedSurface, shade_bodies
 from warpspace.field.evaluate import View, find_placement, placement_effect
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import BASE, BodyMotion, body_motions, branch_pose
@@ -104,7 +104,7 @@ class PlacedBody:
     body: Body  # mesh in its frame
     motion: BodyMotion  # nominal place of that frame, and its small motion
     exaggeration: float  # display factor of the small motion
-    surface: Surface
+    surface: ShadedSurface
 
     @property
     def label(self) -> str:

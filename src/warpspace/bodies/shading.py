@@ -31,7 +31,7 @@ _TINTED = 0.16  # share of the hue in the colour of a body
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Surface:
+class ShadedSurface:
     """Surface of a body in its frame."""
 
     vertices_mm: Array  # [V, 3]
@@ -41,7 +41,7 @@ class Surface:
 
 
 @lru_cache(maxsize=16)
-def shade_bodies(bodies: tuple[Body, ...], poses: tuple[bytes, ...]) -> tuple[Surface, ...]:
+def shade_bodies(bodies: tuple[Body, ...], poses: tuple[bytes, ...]) -> tuple[ShadedSurface, ...]:
     """Shade the bodies of a machine, whose frames have the poses in R, [4, 4] each."""
     matrices = [np.frombuffer(pose).reshape(4, 4) for pose in poses]
     turns, shifts = ([m[:3, k].squeeze() for m in matrices] for k in (slice(3), 3))
@@ -52,13 +52,19 @@ def shade_bodies(bodies: tuple[Body, ...], poses: tuple[bytes, ...]) -> tuple[Su
     everything = np.concatenate(placed)
     floor, size = everything.min(axis=0), float(np.ptp(everything, axis=0).max())
     below = np.array([[-np.inf] * 3, [np.inf, np.inf, floor[2]]])
-    surfaces, boxes, owners = list[Surface](), [below], [-1]  # floor, then shapes of all bodies
+    surfaces, boxes, owners = (
+        list[ShadedSurface](),
+        [below],
+        [-1],
+    )  # floor, then shapes of all bodies
     for body, points in zip(bodies, placed, strict=True):
         colour = np.array(body.colour) / 255.0
         if body.frame[0] in _HUES:
             colour += _TINTED * (np.array(_HUES[body.frame[0]]) / 255.0 - colour)
         vertices, normals, triangles, shapes = _bevel(body, _LARGEST_BEVEL * size)
-        surfaces.append(Surface(vertices, normals, triangles, np.tile(colour, (len(vertices), 1))))
+        surfaces.append(
+            ShadedSurface(vertices, normals, triangles, np.tile(colour, (len(vertices), 1)))
+        )
         owners += [len(surfaces) - 1] * len(shapes)
         boxes += [np.stack([points[at].min(axis=0), points[at].max(axis=0)]) for at in shapes]
     for number, (surface, turn, shift) in enumerate(zip(surfaces, turns, shifts, strict=True)):

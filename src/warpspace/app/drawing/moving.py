@@ -22,7 +22,7 @@ from warpspace.app.evaluation.scene_overlays import moved_place
 from warpspace.app.state.leaf import Identity
 from warpspace.bodies.gltf import GltfNode, Material, build_gltf
 from warpspace.bodies.placed import PlacedBody
-from warpspace.bodies.shading import Surface
+from warpspace.bodies.shading import ShadedSurface
 from warpspace.geometry.colour import srgb_to_linear
 from warpspace.geometry.surfaces import triangulate
 from warpspace.kinematics import transforms
@@ -80,11 +80,11 @@ def _glb(*nodes: GltfNode) -> SceneNode:
 
 
 @lru_cache(maxsize=128)
-def _solid(surface: Surface, pose: bytes) -> SceneNode:
+def _solid(surface: ShadedSurface, pose: bytes) -> SceneNode:
     return _glb(_surface_node(surface, np.frombuffer(pose).reshape(4, 4), "body"))
 
 
-def _surface_node(surface: Surface, pose: Array, name: str, opacity: float = 1.0) -> GltfNode:
+def _surface_node(surface: ShadedSurface, pose: Array, name: str, opacity: float = 1.0) -> GltfNode:
     points = transforms.apply(pose, surface.vertices_mm)
     attributes: dict[str, Array] = {}
     if surface.normals is not None:  # rounded, which halves their bytes; viser needs floats
