@@ -135,6 +135,15 @@ def test_what_fails_because_a_page_has_just_gone_is_no_error(viewer, monkeypatch
     assert not caplog.records
 
 
+def test_a_page_is_told_of_values_that_are_rejected_and_of_no_others(wire, viewer):
+    assert wire.read_until(lambda: wire.is_open)
+    (own,) = viewer.sessions
+    for value, count in (("abc", 1), ("50", 1), ("9e9", 2)):  # invalid, valid, clamped
+        wire.say(do.SetLeaf("exaggeration", value))
+        assert wire.read_until(lambda value=value: value != "50" or own.state.exaggeration == 50.0)
+        assert wire.read_until(lambda count=count: wire.calls["Page.settle"] == count)
+
+
 @pytest.fixture
 def watched(monkeypatch):
     """Jobs, with what they show and report."""

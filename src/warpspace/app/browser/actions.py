@@ -206,8 +206,11 @@ class Scrub(Action):
     value: Text = ""
 
 
+Motion: TypeAlias = Literal["exaggeration", "rotation"]
+
+
 class SaveAnimation(Action):
-    motion: Literal["exaggeration", "rotation"]
+    motion: Motion
 
 
 class OpenSection(Action):

@@ -405,7 +405,7 @@ class Session:
         if picture is None:  # the page could not be built
             return
         context.player.follow(picture.state, state)
-        before, self._scale = self._scale, self._drawn_scale(state)
+        before, self._scale, is_rejected = self._scale, self._drawn_scale(state), bool(notes)
         if context.camera.wanted and focus(picture.state) == focus(state):
             context.camera.place(picture)
         if notes or state is not picture.state or self._scale != before:
@@ -419,12 +419,14 @@ class Session:
                 if not self._revert(error, now, self._shown):
                     raise
                 self.run_guarded(partial(self._show, picture, picture, force=True))
-                state, now, notes = picture.state, self._shown, []
+                now, notes, is_rejected = self._shown, [], True
             else:
                 self._keep_in_view(evaluated)
             self._shown = now
+        elif self.display.scheduler.due_in_s is None:  # otherwise a panel may still show the past
+            is_rejected = True
         controls = [str(action) for action in actions if hasattr(action, "value")]
-        if controls and (notes or state is picture.state):
+        if controls and is_rejected:
             context.page.call("settle", controls)
         if notes:
             context.notify("Please note", "\n".join(notes), "warning")
