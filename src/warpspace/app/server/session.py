@@ -375,7 +375,6 @@ class Session:
             is_held, context = action is do.Signal.HOLD, self.context
             self._drag_start = context.picture if is_held else None
             context.held_since = context.changed_at if is_held else None
-        self.context.player.is_still |= action is do.Signal.REDUCE_MOTION
         if not isinstance(action, do.TabHere) or self._is_identified:
             return
         self._is_identified = True
