@@ -141,6 +141,10 @@ class PlaybackPanel(Panel):
         player.speed = speeds.get(name, player.speed)
         self.rerender()
 
+    @on(do.Signal.REDUCE_MOTION, later=True)
+    def reduce_motion(self) -> None:
+        self.context.player.is_still = True
+
     @on(do.Input.CHOOSE_TRACK, later=True)
     def choose_track(self, name: str) -> None:
         track = self.context.find_tracks().get(name)

@@ -377,7 +377,6 @@ class Session:
             context.held_since = context.changed_at if is_held else None
         if action is do.Signal.RISE and self.context.picture is not None:
             self.context.page.run_script(rise_script(self.context.picture))
-        self.context.player.is_still |= action is do.Signal.REDUCE_MOTION
         if not isinstance(action, do.TabHere) or self._is_identified:
             return
         self._is_identified = True

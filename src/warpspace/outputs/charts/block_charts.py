@@ -79,7 +79,7 @@ def sheet(
         text.set(va="top", parse_math=False)  # a $ in the title of a scene is a dollar
         wide = text.get_window_extent().width / figure.dpi
         if wide > width - 0.5 and size == TITLE:  # in two lines
-            text.set(y=y + 0.1 / height, size=WRAPPED * size, linespacing=1.1)
+            text.set(y=y + 0.1 / height, size=WRAPPED * TITLE, linespacing=1.1)
             length = int(len(heading) * (width - 0.5) / wide / WRAPPED)
             text.set_text("\n".join(wrap(heading, length, max_lines=2, placeholder=" …")))
             wide = text.get_window_extent().width / figure.dpi
