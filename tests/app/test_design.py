@@ -90,7 +90,8 @@ def test_a_probability_is_that_of_the_command(loop, over, distribution):
 def test_the_worst_point_of_the_workpiece_loop_is_refused_with_a_way_out():
     part = lone_part(design.TolerancesPanel, "allocate")
     shown = section(part, state_of(PROPOSED, Loop.WORKPIECE))
-    assert "montecarlo --over max" in shown
+    assert "one random point of each machine" in shown
+    assert "expected “" in shown
     assert "Evaluated at" in shown
 
 

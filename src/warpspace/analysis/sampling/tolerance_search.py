@@ -111,8 +111,8 @@ def refuse_many_points(loop: Loop) -> None:
     """Refuse the loop in which the worst point of a machine lies among too many points."""
     if loop is Loop.WORKPIECE:
         raise OptionError(
-            "the worst point of the workpiece loop lies among all turns of the table: ask for one"
-            " random point per machine ({over} sampled), or sample machines with {over} max"
+            "the worst point of the workpiece loop lies among all turns of the table; expected"
+            " {over} = sampled, one random point of each machine"
         )
 
 

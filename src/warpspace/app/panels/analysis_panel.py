@@ -340,12 +340,15 @@ class AnalysisPanel(Section):
         self.rerender()
 
     def _fail(self, error: Exception) -> None:
-        text = error_words(error)
-        if isinstance(error, WarpspaceError):
-            labels = {option.name: f"“{option.label}”" for option in self.kind.options()}
-            text = error.with_names(lambda name: labels.get(name, name.replace("_", " ")))
-        self.problem = (self.last_key, text)
+        self.problem = (self.last_key, self.spell_error(error))
         self.rerender()
+
+    def spell_error(self, error: Exception) -> str:
+        """Format an exception with the labels of the options."""
+        if not isinstance(error, WarpspaceError):
+            return error_words(error)
+        labels = {option.name: f"“{option.label}”" for option in self.kind.options()}
+        return error.with_names(lambda name: labels.get(name, name.replace("_", " ")))
 
     @on(do.SaveResult, later=True)
     def save(self, action: do.SaveResult) -> None:

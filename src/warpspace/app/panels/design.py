@@ -112,7 +112,7 @@ class TolerancesPanel(AnalysisPanel):
         try:
             return controls + self._probability(sample_machines(state), state)
         except WarpspaceError as error:
-            return controls + alert(str(error))
+            return controls + alert(self.spell_error(error))
 
     def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
         controls = _controls(state, "over", "distribution", "costs")
