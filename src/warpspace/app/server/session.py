@@ -410,7 +410,7 @@ class Session:
                 if not self._revert(error, now, self._shown):
                     raise
                 self.run_guarded(partial(self._show, picture, picture, force=True))
-                now, notes, is_rejected = self._shown, [], True
+                now, notes, is_rejected = self._shown, list[str](), True
             self._shown = now
         elif self.display.scheduler.due_in_s is None:  # otherwise a panel may still show the past
             is_rejected = True
