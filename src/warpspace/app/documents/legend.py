@@ -89,8 +89,10 @@ def marked(picture: LivePicture) -> dict[str, float]:
     if picture.tilts:  # summarised as position errors are
         field = field.tilts
     norm = field.norm_um
-    marks = {"mean": volume_mean(norm, picture.grid), "P95": share_within(field, P95),
-             "max": float(norm.max())} if norm.any() else {}  # fmt: skip
+    marks = dict[str, float]()
+    if norm.any():
+        marks = {"mean": volume_mean(norm, picture.grid), "P95": share_within(field, P95),
+                 "max": float(norm.max())}  # fmt: skip
     limit = picture.state.specification.limit_um
     if limit is not None and not picture.tilts and not picture.is_difference:
         marks["limit"] = limit

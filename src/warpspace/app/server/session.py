@@ -418,7 +418,7 @@ class Session:
                 if not self._revert(error, now, self._shown):
                     raise
                 self.run_guarded(partial(self._show, picture, picture, force=True))
-                now, notes, is_rejected = self._shown, [], True
+                now, notes, is_rejected = self._shown, list[str](), True
             else:
                 self._keep_in_view(evaluated)
             self._shown = now

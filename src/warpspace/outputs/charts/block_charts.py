@@ -77,14 +77,15 @@ def sheet(
         y = 1.0 - down / height
         text = figure.text(x_left, y, heading, size=size, weight=weight, color=colour)
         text.set(va="top", parse_math=False)  # a $ in the title of a scene is a dollar
-        wide = text.get_window_extent().width / figure.dpi
+        wide, drawn_size = text.get_window_extent().width / figure.dpi, size
         if wide > width - 0.5 and size == TITLE:  # in two lines
-            text.set(y=y + 0.1 / height, size=WRAPPED * TITLE, linespacing=1.1)
+            drawn_size = WRAPPED * size
+            text.set(y=y + 0.1 / height, size=drawn_size, linespacing=1.1)
             length = int(len(heading) * (width - 0.5) / wide / WRAPPED)
             text.set_text("\n".join(wrap(heading, length, max_lines=2, placeholder=" …")))
             wide = text.get_window_extent().width / figure.dpi
         if wide > width - 0.5:  # smaller, so that it does not run off the sheet
-            text.set_fontsize(text.get_fontsize() * max((width - 0.5) / wide, LEAST_SHARE))
+            text.set_fontsize(drawn_size * max((width - 0.5) / wide, LEAST_SHARE))
     return figure, 1.0 - top_in / height
 
 

@@ -217,7 +217,7 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     ]
     if largest == 0.0:
         facts.append("no error of a rotary axis displaces these points: nominal traces only")
-        traces, coloured, legend = [], [], legend[:1]
+        traces, coloured, legend = traces[:0], coloured[:0], legend[:1]
     sheet = start_sheet("traces", settings, title, facts, scenes, legend, exact=exact)
     canvas = sheet.canvas
     points = [nominal, *(line.actual_mm for line in traces)]
