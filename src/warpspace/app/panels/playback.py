@@ -115,7 +115,7 @@ class PlaybackPanel(Panel):
         names = {name: name for name in tracks if name != STORY}
         if len(names) > 1:
             buttons.insert(0, html.choice(do.Input.CHOOSE_TRACK(), chosen, names, label="Play"))
-        motions = {played_axis(state): "rotation"}
+        motions: dict[str | None, do.Motion] = {played_axis(state): "rotation"}
         if not state.shows_rotary:
             motions[EXAGGERATION] = "exaggeration"
         if chosen in motions:
