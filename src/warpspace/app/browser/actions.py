@@ -207,9 +207,6 @@ class Scrub(Action):
     value: Text = ""
 
 
-Motion: TypeAlias = Literal["exaggeration", "rotation"]
-
-
 class SaveAnimation(Action):
     motion: Motion
 
