@@ -102,11 +102,11 @@ def test_what_field_writes_is_read_in_its_own_frame(warpspace, tmp_path):
     # what contradicts itself, and what is no relative error
     warpspace(*fit, tmp_path / "machine.csv", "--frame", "workpiece").refused("machine frame")
     warpspace("field", scene, *AT, "--loop", "tool", "--csv", tmp_path / "tool.csv")
-    warpspace(*fit, tmp_path / "tool.csv").refused("error_tool_r_x_um", "--loop relative")
+    warpspace(*fit, tmp_path / "tool.csv").refused("error_tool_r_x_um", "expected errors in the relative loop")
     placed = warpspace(*relative, "--placed", "--csv", tmp_path / "placed.csv", "--json").out
     (tmp_path / "placed.json").write_text(placed, encoding="utf-8")
     for name in ("placed.csv", "placed.json"):
-        warpspace(*fit, tmp_path / name).refused("error_relative_placed_r", "--kind tracker")
+        warpspace(*fit, tmp_path / name).refused("error_relative_placed_r", "kind tracker")
         read = warpspace(*fit, tmp_path / name, "--kind", "tracker").json
         assert [row["value"] for row in read["parameters"] if row["estimable"] == "yes"] == (
             pytest.approx([25.0, -30.0, 12.0], rel=1e-3)
