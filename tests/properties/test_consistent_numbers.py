@@ -237,7 +237,7 @@ def check_page(state: AppState) -> None:
         assert limits_in(kept) == ({limit} if limit else set())
         assert ("no limit set" in kept) is (limit is None)
         assert ("all of the volume" in kept) is (limit is not None and largest <= limit)
-    if picture.component == "norm":
+    if picture.component == "norm" and largest:  # no errors, no marks
         near(numbers_after("mean", legend)[:1], mean)
         near(numbers_after("max", legend)[:1], largest)
         judged = limit is not None and not picture.is_difference and not picture.is_rotary
@@ -250,8 +250,8 @@ def check_sections(picture, mean, largest) -> None:
     limit = state.specification.limit_um
     if not picture.is_rotary:
         volume_text = text_of(VolumePanel(None).body(picture))
-        near(numbers_after(r"(?<!tilt, )mean", volume_text)[:1], mean, 2)
-        near(numbers_after(r"(?<!tilt, )max", volume_text)[:1], largest, 2)
+        near(numbers_after(r"(?<!tilt, )mean", volume_text)[:1], mean)
+        near(numbers_after(r"(?<!tilt, )max", volume_text)[:1], largest)
         assert LOOP_WORDS[drawn.loop] in volume_text
         worst = WorstPanel(None).heading(picture)
         if not picture.is_difference and drawn.controller is None:
@@ -274,11 +274,12 @@ def check_sections(picture, mean, largest) -> None:
     assert ("No limit is set" in dialog) is (limit is None)
 
 
-@pytest.mark.parametrize("block", [
-    0, *(pytest.param(block, marks=pytest.mark.nightly) for block in range(1, 33)),
+@pytest.mark.parametrize("seeds", [
+    range(80), *(pytest.param(range(start, start + 300), marks=pytest.mark.nightly)
+                  for start in range(80, 10_000, 300)),
 ])  # fmt: skip
-def test_heading_legend_rows_and_sections_state_the_same(block):
-    for seed in range(300 * block, 300 * (block + 1)):
+def test_heading_legend_rows_and_sections_state_the_same(seeds):
+    for seed in seeds:
         try:
             check_page(random_state(seed))
         except AssertionError as error:
@@ -295,8 +296,8 @@ def check_files(state: AppState) -> None:
     near(numbers_after("mean", heading)[:1], mean)
     near(numbers_after("max", heading)[:1], largest)
     if not picture.is_rotary and not picture.is_difference:
-        near(numbers_after("mean", column)[-1:], mean, 2)
-        near(numbers_after("max", column)[-1:], largest, 2)
+        near(numbers_after("mean", column)[-1:], mean)
+        near(numbers_after("max", column)[-1:], largest)
         assert limits_in(heading) == ({limit} if limit else set())
         assert ("no limit set" in heading) is (limit is None)
         assert LOOP_WORDS[picture.drawn_state.loop] in heading
@@ -309,8 +310,8 @@ def check_files(state: AppState) -> None:
     assert isinstance(cards, Cards)
     assert review.scenes[0].scene.title == picture.title
     stated = {name: float(value.split()[0]) for name, value, *_ in cards.cards}
-    near([stated["mean |E|"]], mean, rel=5e-3)  # three digits
-    near([stated["max"]], largest, rel=5e-3)
+    near([stated["mean |E|"]], mean)
+    near([stated["max"]], largest)
     words = text_of(lead.text)
     if not largest:
         assert "The error is zero" in words
