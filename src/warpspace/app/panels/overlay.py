@@ -43,6 +43,7 @@ class HeadPanel(Panel):
 
     name = "head"
     refresh = Refresh.IMMEDIATE
+    _subject: object = None  # of the latest heading
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         subjects, place = legend.subject_words(picture), legend.place_words(picture)
@@ -57,7 +58,13 @@ class HeadPanel(Panel):
             words=(tag("p", " · ".join(subjects), class_="ws-subject") if subjects else EMPTY)
             + (EMPTY if picture.is_rotary else legend.part_html(picture)) + _rotary_offer(picture),
         )  # fmt: skip
-        return {"head": head}
+        subject = (Identity(picture.drawn_state.scene), picture.is_rotary, picture.is_difference,
+                   picture.largest_um > 0.0)  # fmt: skip
+        if subject == self._subject:
+            return {"head": head}
+        self._subject = subject
+        # written anew by `OrderPanel`, later
+        return {"head": head, "head.order": EMPTY, "head.allowed": EMPTY, "head.cause": EMPTY}
 
 
 def _rotary_offer(picture: LivePicture) -> Markup:
@@ -76,7 +83,7 @@ class LegendPanel(Panel):
     refresh = Refresh.THROTTLED
 
     def dependencies(self, picture: LivePicture) -> tuple[object, ...]:
-        return (picture.scale, id(picture))
+        return (picture.scale, picture.serial)
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         limit_menu = EMPTY
