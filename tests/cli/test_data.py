@@ -102,7 +102,8 @@ def test_what_field_writes_is_read_in_its_own_frame(warpspace, tmp_path):
     # what contradicts itself, and what is no relative error
     warpspace(*fit, tmp_path / "machine.csv", "--frame", "workpiece").refused("machine frame")
     warpspace("field", scene, *AT, "--loop", "tool", "--csv", tmp_path / "tool.csv")
-    warpspace(*fit, tmp_path / "tool.csv").refused("error_tool_r_x_um", "expected errors in the relative loop")
+    expected = "expected errors in the relative loop"
+    warpspace(*fit, tmp_path / "tool.csv").refused("error_tool_r_x_um", expected)
     placed = warpspace(*relative, "--placed", "--csv", tmp_path / "placed.csv", "--json").out
     (tmp_path / "placed.json").write_text(placed, encoding="utf-8")
     for name in ("placed.csv", "placed.json"):
