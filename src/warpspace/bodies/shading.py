@@ -52,11 +52,8 @@ def shade_bodies(bodies: tuple[Body, ...], poses: tuple[bytes, ...]) -> tuple[Sh
     everything = np.concatenate(placed)
     floor, size = everything.min(axis=0), float(np.ptp(everything, axis=0).max())
     below = np.array([[-np.inf] * 3, [np.inf, np.inf, floor[2]]])
-    surfaces, boxes, owners = (
-        list[ShadedSurface](),
-        [below],
-        [-1],
-    )  # floor, then shapes of all bodies
+    surfaces = list[ShadedSurface]()
+    boxes, owners = [below], [-1]  # floor, then shapes of all bodies
     for body, points in zip(bodies, placed, strict=True):
         colour = np.array(body.colour) / 255.0
         if body.frame[0] in _HUES:
@@ -86,7 +83,17 @@ def _brightness(points: Array, normals: Array, boxes: Array, size: float) -> Arr
         for k in range(3):
             inside &= (at[:, k] > boxes[:, 0, k, None]) & (at[:, k] < boxes[:, 1, k, None])
         covered += inside.any(axis=0)
-    return 1.0 - _DARKENED * covered / (len(_NEAR) * len(sides))
+    brightness = 1.0 - _DARKENED * covered / (len(_NEAR) * len(sides))
+    # linear over each plane, where the triangles of a polygon would show otherwise
+    level = np.sum(points * normals, axis=1, keepdims=True)
+    keys = np.round(np.concatenate([1000.0 * normals, level], axis=1))
+    plane = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+    for number in np.flatnonzero(np.bincount(plane) > 3):
+        at = np.flatnonzero(plane == number)
+        basis = np.insert((points[at] - points[at].mean(axis=0)) / size, 3, 1.0, axis=1)
+        fitted = basis @ np.linalg.lstsq(basis, brightness[at])[0]
+        brightness[at] = fitted - max(fitted.max() - 1.0, 0.0)
+    return np.maximum(brightness, 1.0 - _DARKENED)
 
 
 def _bevel(

@@ -83,3 +83,15 @@ def test_an_open_or_a_very_large_body_is_drawn_as_it_is():
         (surface,) = shade_bodies((sharp,), (HERE,))
         assert surface.normals is None
         assert surface.triangles is sharp.triangles
+
+
+def test_the_brightness_of_a_flat_side_is_linear_so_that_its_triangles_do_not_show():
+    plate = box((0, 1000), (0, 100), (0, 1000))
+    post = box((0, 300), (-200, 0), (0, 300))  # beside one corner of the plate
+    shaded, _ = shade_bodies((body(plate), body(post)), (HERE, HERE))
+    at, brightness = shaded.vertices_mm, shaded.colours[:, 2]
+    front = shaded.normals[:, 1] < -0.9
+    basis = np.insert(at[front][:, [0, 2]], 2, 1.0, axis=1)
+    fitted = basis @ np.linalg.lstsq(basis, brightness[front])[0]
+    np.testing.assert_allclose(brightness[front], fitted, atol=1e-9)
+    assert np.ptp(brightness[front]) > 0.01

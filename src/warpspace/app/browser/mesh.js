@@ -43,7 +43,7 @@
   const SHADOW = { transparent: false, depthWrite: false, blending: 5, blendSrc: 204, blendDst: 205,
     blendSrcAlpha: 201, blendDstAlpha: 205 };
   const BODY = { transparent: false, depthWrite: true, opacity: 1 };
-  const PALE = { light: [0.9, 0.9], dark: [0.07, 0.015] };  // share of its colours, and light added
+  const PALE = { light: [0.9, 0.9], dark: [0.035, 0.012] };  // share of its colours, and light added
 
   window.warpspaceMesh = {
     solid: 0,  // share in which the ghost is solid

@@ -14,10 +14,7 @@ from warpspace.app.drawing.colours import colour
 from warpspace.app.drawing.player import PROGRAM, Player
 from warpspace.app.drawing.shapes import SCENE_PER_MM, UNLIT, Nodes, SceneNode, Shapes, ball, lines
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine_bodies import (
-    drawn_bodies,
-    tool_point,
-)
+from warpspace.app.evaluation.machine_bodies import drawn_bodies, tool_point
 from warpspace.app.evaluation.scene_overlays import moved_place
 from warpspace.app.state.leaf import Identity
 from warpspace.bodies.gltf import GltfNode, Material, build_gltf
