@@ -289,3 +289,8 @@ def test_the_shadow_lies_on_the_floor_and_fades_out_beyond_the_machine():
     assert colours[within, 3].min() > colours[~within, 3].max()
     rim = (points[:, 0] == points[:, 0].min()) | (points[:, 1] == points[:, 1].max())
     np.testing.assert_allclose(colours[rim, 3], 0.0, atol=1e-6)
+
+
+def test_the_arm_of_a_robot_is_not_hidden_by_the_volume_around_it():
+    assert start_state(load_scene("ur10")).look.surface == "grid"
+    assert start_state(load_scene("machine_scara")).look.surface == "surface"

@@ -79,10 +79,8 @@ def _brightness(points: Array, normals: Array, boxes: Array, size: float) -> Arr
     covered = np.zeros(len(points))
     for distance, side in product(_NEAR, sides):
         at = points + distance * size * (normals + 0.8 * side)
-        inside = np.ones((len(boxes), len(points)), dtype=bool)
-        for k in range(3):
-            inside &= (at[:, k] > boxes[:, 0, k, None]) & (at[:, k] < boxes[:, 1, k, None])
-        covered += inside.any(axis=0)
+        inside = (at > boxes[:, None, 0]) & (at < boxes[:, None, 1])  # [m, n, 3]
+        covered += inside.all(axis=-1).any(axis=0)
     brightness = 1.0 - _DARKENED * covered / (len(_NEAR) * len(sides))
     # linear over each plane, where the triangles of a polygon would show otherwise
     level = np.sum(points * normals, axis=1, keepdims=True)

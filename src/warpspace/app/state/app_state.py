@@ -479,6 +479,8 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
     at = scene.workspace.positions
     positions = {axis: at.get(axis, 0.0) for axis in position_spans(scene)}
     part, notes = PartLook.of_scene(scene)
+    # an arm stands within the volume that its joints span
+    is_within = not part.is_empty or not any(is_linear(axis) for axis in scene.workspace.ranges)
     state = AppState(
         scene,
         start,
@@ -491,7 +493,7 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
         tolerances=scene.tolerances,
         review=scene.review,
         part=part,
-        look=Look() if part.is_empty else Look(surface="grid"),
+        look=Look(surface="grid") if is_within else Look(),
         forms={"program.tcp": scene.part.tcp} if scene.part.tcp else {},
         notes=notes,
     )
