@@ -100,7 +100,7 @@
       for (let up = node; up && up !== root; up = up.offsetParent) { x += up.offsetLeft; y += up.offsetTop; }
       return { x, y, w: node.offsetWidth, h: node.offsetHeight };
     });
-  const ANGLES = [0, 25, -25, 50, -50, 80, -80, 120, -120].map(degrees => degrees * Math.PI / 180);
+  const ANGLES = [0, 25, -25, 50, -50, 80, -80, 120, -120, 160, -160].map(degrees => degrees * Math.PI / 180);
   const FAR = [20, 34, 52, 76], BESIDE = [...FAR, 110, 150, 200, 260];
 
   const drawPointLabels = (camera, world, rect) => {
