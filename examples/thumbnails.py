@@ -16,6 +16,7 @@ from PIL import Image
 
 from warpspace.bodies.placed import place_bodies
 from warpspace.geometry import surfaces
+from warpspace.machine.axes import is_linear
 from warpspace.outputs.drawing import map3d, off_screen
 from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.settings import LIGHT, FigureSettings, evaluate_for
@@ -47,7 +48,9 @@ def draw(name: str) -> Image.Image:
     faces = surfaces.outer_faces(shape)
     volume = off_screen.render_bodies(map3d.surface_bodies(whole, faces), projection)
     if volume is not None:
-        map3d.draw_raster(canvas, volume, 0.8 if is_machine else 0.95, 2.0)
+        is_around = not any(is_linear(axis) for axis in scene.workspace.ranges)  # an arm
+        opacity = 0.25 if is_around else 0.8 if is_machine else 0.95
+        map3d.draw_raster(canvas, volume, opacity, 2.0)
     creases = surfaces.crease_lines(faces, shape) or surfaces.box_edges(shape)
     lines, _ = off_screen.split_visible((nodes[line] for line in creases), projection, volume)
     canvas.lines(lines, width=4.0, zorder=3.0)
