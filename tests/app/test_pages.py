@@ -4,7 +4,7 @@ import re
 import threading
 import time
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from unittest.mock import Mock
 
 import pytest
@@ -17,6 +17,7 @@ from warpspace.analysis.registry import register, unregister
 from warpspace.app.browser import actions as do
 from warpspace.app.documents.output_services import CancelledError, Services
 from warpspace.app.evaluation import cache
+from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.panels.error_list import used_keys
 from warpspace.app.panels.panel import MOST_FILES, Context, Jobs, Panel
 from warpspace.app.server import session
@@ -49,6 +50,11 @@ def viewer(running):
 def wire(viewer):
     with dial(viewer) as socket:
         yield Wire(socket)
+
+
+def test_a_picture_in_the_memory_of_an_old_one_is_rendered_again():
+    drawn, panel = LiveModel().evaluate(start_state(FIRST)), Panel(Nobody())
+    assert len({panel.dependencies(replace(drawn)) for _ in range(100)}) == 100
 
 
 def test_what_lies_around_the_map_comes_when_that_is_drawn(wire, monkeypatch):

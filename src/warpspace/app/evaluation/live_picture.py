@@ -1,8 +1,9 @@
 """The picture of a state or a comparison, which the app draws."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -56,6 +57,8 @@ class LivePicture(Picture):
     state: AppState  # the present state
     traces: tuple[TraceLines, ...]
     compared: Compared | None = None
+    # of this picture only, unlike its id, which a later picture may have again
+    serial: int = field(init=False, default_factory=count().__next__)
 
     @cached_property
     def size_mm(self) -> float:

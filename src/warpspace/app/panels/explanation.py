@@ -205,7 +205,7 @@ def _lever(contribution: PointContribution) -> Markup:
 
 class DistancePanel(AnalysisPanel):
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
-        return (*super().body_dependencies(picture), id(picture))
+        return (*super().body_dependencies(picture), picture.serial)
 
     def before_result(self, state: AppState) -> Markup:
         point, picture = point_explanation.awaited_form(state), self.context.picture

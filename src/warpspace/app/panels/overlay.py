@@ -76,7 +76,7 @@ class LegendPanel(Panel):
     refresh = Refresh.THROTTLED
 
     def dependencies(self, picture: LivePicture) -> tuple[object, ...]:
-        return (picture.scale, id(picture))
+        return (picture.scale, picture.serial)
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         limit_menu = EMPTY

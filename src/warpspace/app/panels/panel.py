@@ -240,7 +240,7 @@ class Panel:
 
     def dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         """Return the inputs of its HTML; while they are equal it is not rendered again."""
-        return (id(picture),)
+        return (picture.serial,)
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         """Render HTML by the name of its place."""
@@ -282,7 +282,7 @@ class Section(Panel):
     sentence = ""  # its purpose, shown as a hint of the title
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
-        return (id(picture),)
+        return (picture.serial,)
 
     def body(self, picture: LivePicture) -> Markup:
         raise NotImplementedError

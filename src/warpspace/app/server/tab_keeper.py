@@ -26,6 +26,7 @@ from warpspace.app.evaluation.compare import without_table
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.panel import Context, Panel, Refresh, on
 from warpspace.app.state.app_state import AppState, Comparison
+from warpspace.app.state.leaf import Identity
 from warpspace.app.state.store import StateStore
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.machine.limits import MAX_KEPT_TEXT
@@ -178,7 +179,7 @@ class TabKeeper(Panel):
         return self._may_keep and self.context.story_state is None
 
     def dependencies(self, picture: LivePicture) -> tuple[object, ...]:
-        return (id(picture.state), self.context.camera.remember())
+        return (Identity(picture.state), self.context.camera.remember())
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         context = self.context
