@@ -127,6 +127,15 @@ def test_without_errors_nothing_overlaps():
     assert largest_words(nominal) == "No errors"
 
 
+def test_the_heading_of_another_machine_does_not_name_the_cause_of_the_one_before():
+    panel, late = lone_part(HeadPanel), {"head.order", "head.allowed", "head.cause"}
+    second = start_state(SECOND, nodes=9)
+    for state in (START, START.zeroed(), second):
+        assert late <= {*panel.render(LIVE.evaluate(state))}
+    moved = second.with_amplitude("EXX", 3.0)  # during a drag they stay
+    assert {*panel.render(LIVE.evaluate(moved))} == {"head"}
+
+
 def test_a_scene_file_carries_the_limit():
     text = scene_to_toml(replace(FIRST, limit_um=40.0))
     back = start_state(parse_scene(text, "x"))

@@ -134,6 +134,15 @@ def test_another_state_drops_the_positions_that_are_not_of_it():
         assert (player.playing == "exaggeration") == ("exaggeration" in stays)
 
 
+def test_the_bar_of_another_drawing_begins_with_its_own_track():
+    for after, chosen in ((put(PROGRAM, "look.drawing", "rotary"), ""), (START, ""),
+                          (put(PROGRAM, "positions.C", "20"), "C")):  # fmt: skip
+        player, _ = player_of(PROGRAM)
+        player.move("C", 20.0)
+        player.follow(PROGRAM, after)
+        assert player.chosen == chosen
+
+
 def test_a_page_without_animations_gets_one_picture_a_second():
     player, clock = player_of(START)
     player.is_still = True

@@ -75,12 +75,11 @@ def whole_factor(picture: LivePicture) -> float:
     return auto_exaggeration(largest, picture.size_mm) if largest else TRUE_SCALE
 
 
-def is_same_machine(before: AppState, after: AppState) -> bool:
-    """Check if positions in one state are positions in another: of axes and of the program."""
+def is_same_drawing(before: AppState, after: AppState) -> bool:
+    """Check if two states have the same machine, program and drawing, thus the same tracks."""
     same = before.origin is after.origin and before.scene.machine is after.scene.machine
     same &= before.part.program is after.part.program
-    same &= before.shows_rotary == after.shows_rotary
-    return same and before.positions == after.positions
+    return same and before.shows_rotary == after.shows_rotary
 
 
 class Player:
@@ -144,7 +143,11 @@ class Player:
 
     def follow(self, before: AppState, after: AppState) -> None:
         """Drop positions that do not belong to a changed state; a story goes on."""
-        dropped = [] if is_same_machine(before, after) else [*self.angles_deg, PROGRAM]
+        is_same = is_same_drawing(before, after)
+        if not is_same and self.chosen != STORY:
+            self.chosen, self._played_at = "", None
+        is_same &= before.positions == after.positions
+        dropped = [] if is_same else [*self.angles_deg, PROGRAM]
         fields = ("scene", "amplitudes", "exaggeration", "exclusions", "look", "comparison")
         if any(getattr(before, name) is not getattr(after, name) for name in fields):
             dropped.append(EXAGGERATION)

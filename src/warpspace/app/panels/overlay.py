@@ -43,6 +43,7 @@ class HeadPanel(Panel):
 
     name = "head"
     refresh = Refresh.IMMEDIATE
+    _subject: object = None  # of the latest heading
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         subjects, place = legend.subject_words(picture), legend.place_words(picture)
@@ -57,7 +58,13 @@ class HeadPanel(Panel):
             words=(tag("p", " · ".join(subjects), class_="ws-subject") if subjects else EMPTY)
             + (EMPTY if picture.is_rotary else legend.part_html(picture)) + _rotary_offer(picture),
         )  # fmt: skip
-        return {"head": head}
+        subject = (Identity(picture.drawn_state.scene), picture.is_rotary, picture.is_difference,
+                   picture.largest_um > 0.0)  # fmt: skip
+        if subject == self._subject:
+            return {"head": head}
+        self._subject = subject
+        # written anew by `OrderPanel`, later
+        return {"head": head, "head.order": EMPTY, "head.allowed": EMPTY, "head.cause": EMPTY}
 
 
 def _rotary_offer(picture: LivePicture) -> Markup:
