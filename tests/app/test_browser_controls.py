@@ -54,6 +54,13 @@ def test_a_rejected_value_reverts_with_the_reason(tab: Tab):
         tab.until(lambda value=value: box.input_value() == value)
 
 
+def test_a_list_with_new_choices_shows_the_selected_one(tab: Tab):
+    for options in ("<option selected>B", "<option>B<option selected>program<option>C"):
+        pieces = {"story": f"<select id=a-list>{options}</select>"}
+        tab.page.evaluate("pieces => warpspacePage.show(pieces)", pieces)
+    assert tab.page.locator("#a-list").input_value() == "program"
+
+
 def test_a_drag_with_a_pause_is_one_step_and_undo_restores_the_range(tab: Tab):
     slider = tab.page.get_by_role("slider", name="EA0Z squareness of Z to Y")
     box = slider.bounding_box()

@@ -68,7 +68,7 @@
       copyAttributes(match, next);
       if (!next.hasAttribute("data-piece") && !match.querySelector(":scope > .ws-typed")) patch(match, next);
       if (match.tagName === "SELECT" && match !== document.activeElement)
-        match.value = next.querySelector("option[selected]")?.value ?? match.options[0]?.value;
+        match.value = match.querySelector("option[selected]")?.value ?? match.options[0]?.value;  // `next` has lost new options
     }
     while (at) { const gone = at; at = at.nextSibling; gone.remove(); }
   };
