@@ -119,3 +119,12 @@ def test_messages_and_menus_cover_nothing_and_notes_are_reached_at_every_size(op
         page.locator("#ws-notes header").wait_for()
         assert tab.in_sight("#ws-notes header")
         page.locator("#ws-notes [data-do='close_notes']").click()
+
+
+def test_the_playback_bar_of_a_program_keeps_within_a_phone(open_tab):
+    tab: Tab = open_tab(size=(390, 800))
+    line = "<div class=ws-line>" + "G1 X80.0000 Y-80.0000 36.1 µm, " * 9 + "</div>"
+    bar = f"<div><div class=ws-turn><button>Play</button><span>line 6</span></div>{line}</div>"
+    tab.page.evaluate("bar => warpspacePage.show({ playback: bar })", bar)
+    box = tab.page.locator(".ws-playback > div").bounding_box()
+    assert box["x"] + box["width"] <= 390

@@ -75,13 +75,6 @@ def whole_factor(picture: LivePicture) -> float:
     return auto_exaggeration(largest, picture.size_mm) if largest else TRUE_SCALE
 
 
-def is_same_drawing(before: AppState, after: AppState) -> bool:
-    """Check if two states have the same machine, program and drawing, thus the same tracks."""
-    same = before.origin is after.origin and before.scene.machine is after.scene.machine
-    same &= before.part.program is after.part.program
-    return same and before.shows_rotary == after.shows_rotary
-
-
 class Player:
     """Positions of the tracks that have been moved, and the track that plays."""
 
@@ -142,8 +135,10 @@ class Player:
         self._moved()
 
     def follow(self, before: AppState, after: AppState) -> None:
-        """Drop positions that do not belong to a changed state; a story goes on."""
-        is_same = is_same_drawing(before, after)
+        """Drop track and positions that do not belong to a changed state; a story goes on."""
+        is_same = before.origin is after.origin and before.scene.machine is after.scene.machine
+        is_same &= before.part.program is after.part.program
+        is_same &= before.shows_rotary == after.shows_rotary
         if not is_same and self.chosen != STORY:
             self.chosen, self._played_at = "", None
         is_same &= before.positions == after.positions

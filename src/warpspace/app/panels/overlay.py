@@ -60,11 +60,9 @@ class HeadPanel(Panel):
         )  # fmt: skip
         subject = (Identity(picture.drawn_state.scene), picture.is_rotary, picture.is_difference,
                    picture.largest_um > 0.0)  # fmt: skip
-        if subject == self._subject:
-            return {"head": head}
+        late = () if subject == self._subject else ("head.order", "head.allowed", "head.cause")
         self._subject = subject
-        # written anew by `OrderPanel`, later
-        return {"head": head, "head.order": EMPTY, "head.allowed": EMPTY, "head.cause": EMPTY}
+        return {"head": head, **dict.fromkeys(late, EMPTY)}  # `OrderPanel` writes them later
 
 
 def _rotary_offer(picture: LivePicture) -> Markup:
