@@ -12,7 +12,7 @@ from warpspace.app.documents import legend
 from warpspace.app.drawing.around import draw_surroundings
 from warpspace.app.drawing.box import box
 from warpspace.app.drawing.labels import axis_labels, point_labels
-from warpspace.app.evaluation.compare import with_pin
+from warpspace.app.evaluation.compare import TRACES_DIFFER, with_pin
 from warpspace.app.panels.error_list import _gains
 from warpspace.app.panels.overlay import ControlsPanel, HeadPanel, OrderPanel
 from warpspace.app.panels.playback import PlaybackPanel
@@ -243,6 +243,13 @@ def test_the_cause_of_a_sample_is_that_of_the_explanation_of_its_point():
     bar = Alone(PlaybackPanel, state)
     bar.do(do.Signal.SHOW_WORST_BLOCK)
     assert f"because {parameter(first).cause}" in bar.part.render(picture)["playback"]
+
+
+def test_traces_at_other_positions_have_no_difference_and_it_says_why():
+    state = replace(with_pin(ROTARY.with_amplitude("EB0C", 20.0)), positions={"B": 30.0, "C": 10.0})
+    picture = LIVE.evaluate(put(state, "comparison.shown", "difference"))
+    assert picture.compared.refused == TRACES_DIFFER
+    assert (picture.compared.view, picture.is_difference) == ("b", False)
 
 
 def test_a_comparison_of_rotary_errors_shows_their_change():

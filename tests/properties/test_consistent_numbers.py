@@ -237,7 +237,7 @@ def check_page(state: AppState) -> None:
         assert limits_in(kept) == ({limit} if limit else set())
         assert ("no limit set" in kept) is (limit is None)
         assert ("all of the volume" in kept) is (limit is not None and largest <= limit)
-    if picture.component == "norm":
+    if picture.component == "norm" and largest:  # no errors, no marks
         near(numbers_after("mean", legend)[:1], mean)
         near(numbers_after("max", legend)[:1], largest)
         judged = limit is not None and not picture.is_difference and not picture.is_rotary
@@ -274,11 +274,12 @@ def check_sections(picture, mean, largest) -> None:
     assert ("No limit is set" in dialog) is (limit is None)
 
 
-@pytest.mark.parametrize("block", [
-    0, *(pytest.param(block, marks=pytest.mark.nightly) for block in range(1, 33)),
+@pytest.mark.parametrize("seeds", [
+    range(80), *(pytest.param(range(start, start + 300), marks=pytest.mark.nightly)
+                  for start in range(80, 10_000, 300)),
 ])  # fmt: skip
-def test_heading_legend_rows_and_sections_state_the_same(block):
-    for seed in range(300 * block, 300 * (block + 1)):
+def test_heading_legend_rows_and_sections_state_the_same(seeds):
+    for seed in seeds:
         try:
             check_page(random_state(seed))
         except AssertionError as error:

@@ -25,6 +25,7 @@ LOOKED_AT = (
 )  # fmt: skip
 """Fields of the present state that apply to both sides."""
 REFUSED = "The working volumes differ, so no difference can be computed node by node."
+TRACES_DIFFER = "The nominal traces differ, so no difference can be computed point by point."
 
 
 def side_state(now: AppState, side: Side) -> AppState:
@@ -77,6 +78,8 @@ def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState)
     )
     refused = "" if same_nodes(a.grid.nominal_mm, b.grid.nominal_mm) else REFUSED
     difference = None if refused else _difference(a, b)
+    if difference and state.shows_rotary and len(difference.traces) < len(b.traces):
+        refused, difference = TRACES_DIFFER, None
     scale = _shared_scale(state, [a, b])
     view = "b" if refused and chosen.shown == "difference" else chosen.shown
     drawn, other = {"a": (a, b), "b": (b, a), "difference": (difference or b, None)}[view]
