@@ -12,10 +12,13 @@ from warpspace.app.documents import legend
 from warpspace.app.drawing.camera import CameraMemory, is_in_view
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.live_model import DrawnScale
+from warpspace.app.panels.improve import RESIDUAL, with_box
 from warpspace.app.server.session import same_scales
 from warpspace.app.state import store
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
+from warpspace.formats.compensation.compensate import Compensate, compensate
+from warpspace.formats.compensation.controller import CorrectedPoints
 from warpspace.scene.library import load_scene
 
 FIRST = load_scene("dvf5000_first")
@@ -117,6 +120,21 @@ def test_both_ends_of_a_range_that_is_exceeded_say_so():
     assert [texts[0][:2], texts[-1][:2]] == ["< ", "> "]
     ends = [mark.text for mark in legend.marks(picture) if not mark.name]
     assert all(text[0] not in "<>" for text in ends)
+
+
+@pytest.mark.parametrize("drawing", ["volume", "rotary"])
+def test_a_drag_moves_residual_errors_by_the_first_order_and_ends_exact(monkeypatch, drawing):
+    plan = Compensate(formats=("iso-text",), points=3)
+    table = compensate(FIRST, plan, 3).controller
+    before = LIVE.evaluate(put(with_box(START, RESIDUAL, table), "look.drawing", drawing))
+    drag_start = DrawnScale(before.exaggeration, before.scale, before.state.amplitudes)
+    assert np.array_equal(LIVE.evaluate(before.state, drag_start).shown_values, before.shown_values)
+    after = before.state.with_amplitude("EA0Z", 60.0).with_amplitude("EB0C", 60.0)
+    exact = LIVE.evaluate(after)
+    assert np.abs(exact.shown_values - before.shown_values).max() > 5.0
+    monkeypatch.delattr(CorrectedPoints, "field")  # the exact chain of every node
+    held = LIVE.evaluate(after, drag_start)
+    assert np.allclose(held.shown_values, exact.shown_values, atol=0.01)
 
 
 # --- The camera keeps the box in its picture ------------------------------------------------------

@@ -33,6 +33,8 @@ WITHIN_LIMIT = 0.27  # place on the scale of signed values: colour of values wit
 TRACE_SAMPLES = 73  # points along a trace: every five degrees of a turn
 Response: TypeAlias = tuple[tuple[Any, ErrorBasis], ...]
 """A grid, and the traces of rotary axes if any, each with its first-order response."""
+Start: TypeAlias = Mapping[str, float] | None
+"""Errors as a drag began: residual errors are exact there, and of first order from there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +43,7 @@ class DrawnScale:
 
     exaggeration: float
     colours: ColourScale | None = None
+    amplitudes: Start = None
 
 
 class LiveModel:
@@ -51,22 +54,26 @@ class LiveModel:
 
     def evaluate(self, state: AppState, drawn: DrawnScale | None = None) -> LivePicture:
         if drawn is not None:
-            picture = self.evaluate(replace(state, exaggeration=drawn.exaggeration))
+            drawn_state = replace(state, exaggeration=drawn.exaggeration)
+            picture = self._evaluate(drawn_state, drawn.amplitudes)
             colours, slices = drawn.colours, picture.slices
             if colours is not None:
                 slices = tuple(replace(piece, colours=colours) for piece in slices)
             return replace(picture, state=state, colours=colours or picture.colours, slices=slices)
-        if state.comparison.b is not None:
-            return compare_pictures(self._single, state)
-        return self._single(state)
+        return self._evaluate(state)
 
-    def _single(self, state: AppState) -> LivePicture:
+    def _evaluate(self, state: AppState, start: Start = None) -> LivePicture:
+        single = partial(self._single, start=start)
+        return compare_pictures(single, state) if state.comparison.b else single(state)
+
+    def _single(self, state: AppState, start: Start) -> LivePicture:
         rotary = state.rotary
         key = _place(state), rotary.off, rotary.own_mm, tuple(rotary.held.items())
         response: Response = self._cache.get(key, lambda: _build(state), _size)
         (grid, basis), *traces = response
-        field, size = self._field(state, grid, basis), model.picture_size_mm(state.scene, grid)
-        errors = [self._field(state, group, own).error_um for group, own in traces]
+        size = model.picture_size_mm(state.scene, grid)
+        field = self._field(state, grid, basis, start)
+        errors = [self._field(state, group, own, start).error_um for group, own in traces]
         drawn = errors if state.shows_rotary else [field.error_um]
         largest = max(
             (float(np.linalg.norm(e, axis=-1).max(initial=0.0)) for e in drawn), default=0
@@ -103,7 +110,7 @@ class LiveModel:
             traces=traced,
         )
         common["colours"] = _chosen_colours(state, picture, basis)
-        slices = tuple(self._slices(state, common))
+        slices = tuple(self._slices(state, common, start))
         return replace(picture, colours=common["colours"], slices=slices)
 
     def _uncertainty(
@@ -125,7 +132,9 @@ class LiveModel:
         errors = replace(uncertainty.errors, unknown=tuple(unknown))
         return replace(uncertainty, errors=errors, error_um=field.error_um, shares=grid.weights)
 
-    def _slices(self, state: AppState, common: Mapping[str, Any]) -> Iterator[model.Slice]:
+    def _slices(
+        self, state: AppState, common: Mapping[str, Any], start: Start
+    ) -> Iterator[model.Slice]:
         scene, workspace = state.scene, state.scene.workspace.moved(state.positions)
 
         def build(axis: str, at: float) -> Response:
@@ -136,16 +145,18 @@ class LiveModel:
             for axis, at in slice_positions(scene, state.look, state.machine).items():
                 key = _place(state), axis, at
                 ((plane, basis),) = self._cache.get(key, partial(build, axis, at), _size)
-                field = self._field(state, plane, basis)
+                field = self._field(state, plane, basis, start)
                 known = self._uncertainty(state, plane, field)
                 drawn: dict[str, Any] = {**common, "field": field, "uncertainty": known}
                 yield model.Slice(**drawn, grid=plane, axis=axis, position_mm=at)
 
-    def _field(self, state: AppState, of: Grid | TraceGroup, basis: ErrorBasis) -> ErrorField:
+    def _field(
+        self, state: AppState, of: Grid | TraceGroup, basis: ErrorBasis, start: Start
+    ) -> ErrorField:
         """Evaluate a grid or traces: to first order, or the residual error of a compensation table.
 
-        Corrections and axis positions, which do not depend on the errors, are cached; a slider move
-        is then one evaluation of the exact chain.
+        Corrections and axis positions, which do not depend on the errors, are cached; a change is
+        then one evaluation of the exact chain, and a drag the first-order response to its change.
         """
         controller, scene = state.controller, state.scene
         on_trace = isinstance(of, TraceGroup)
@@ -162,7 +173,16 @@ class LiveModel:
             lambda: controller.at(of.coordinates, of.nominal_mm, now, loop, point_mm),
             lambda found: found.nbytes,
         )
-        return prepared.field(now.errors)
+        if start is None or start.keys() != state.amplitudes.keys():
+            return prepared.field(now.errors)
+        begun = replace(state, amplitudes=start)
+        change = np.subtract([*begun.active.values()], [*state.active.values()])
+        exact = self._cache.get(
+            (*key, Identity(state.scene), tuple(begun.active.items())),
+            lambda: prepared.field(begun.active_scene().errors),
+            lambda field: 3 * field.error_um.nbytes,
+        )
+        return exact - basis.evaluate(change, orientation=state.look.tilts and not on_trace)
 
 
 def _place(state: AppState) -> tuple[object, ...]:

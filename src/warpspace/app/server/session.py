@@ -434,7 +434,7 @@ class Session:
         """Return the scales of the drawing; None where they are those of the state."""
         start = self._drag_start
         if start is not None and same_scales(start.state, state):
-            return DrawnScale(start.exaggeration, start.scale)
+            return DrawnScale(start.exaggeration, start.scale, start.state.amplitudes)
         factor = self.context.player.at.get(EXAGGERATION)
         return None if factor is None else DrawnScale(factor)
 
