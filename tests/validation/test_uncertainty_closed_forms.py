@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import chi2, ncx2, norm, t
 
 from warpspace.analysis.commands.adjust import Adjust
-from warpspace.analysis.commands.uncertainty import Uncertainty
+from warpspace.analysis.commands.uncertainty import Uncertainty, selected_nodes
 from warpspace.analysis.uncertainty.propagation import (
     coverage_factor,
     field_uncertainty,
@@ -37,7 +37,8 @@ TWO = HEAD + "EXX = 3\nEYX = 4\n" + PAIR
 
 def trust(text, **options):
     scene = parse_scene(text, "s")
-    return Uncertainty(nodes=5, samples=100_000, **options).run(scene, lambda _: None)
+    options = {"nodes": 5, "samples": 100_000, **options}
+    return Uncertainty(**options).run(scene, lambda _: None)
 
 
 def sure(text, error, **at):
@@ -148,6 +149,22 @@ def test_machines_drawn_move_together():
     assert np.quantile(norm_um.max(axis=1), 0.95) == pytest.approx(
         math.sqrt(25 + 6.25 * norm.ppf(0.975) ** 2), rel=0.01
     )
+
+
+def test_fewer_nodes_give_the_probabilities_of_all():
+    # errors that are linear in the position are largest in a corner, which is among both
+    text = f"{HEAD}EXX = 5\nEC0Y = 40\n[uncertainty]\nEXX = 2\nEC0Y = 20\n"
+    few, every = (
+        trust(text, limit_um=9.0, nodes=21, samples=2_000, verify=verify)
+        for verify in (False, True)
+    )
+    assert 0.1 < few.probability_everywhere < few.probability_worst < 0.9
+    assert few.probability_everywhere == every.probability_everywhere
+    assert few.probability_worst == every.probability_worst
+    assert few.statistics == every.statistics
+    chosen = selected_nodes((21, 8, 1), 11)
+    assert len(chosen) == 11 * 8
+    assert {0, 21 * 8 - 1} < {*chosen.tolist()}
 
 
 def test_each_error_counts_by_its_own_degrees_of_freedom():

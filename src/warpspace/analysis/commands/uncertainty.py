@@ -24,9 +24,10 @@ from warpspace.machine.axes import parameter
 from warpspace.machine.errors import Covariance
 from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.model import Scene, choose_view, evaluate_grid
-from warpspace.units import Array
+from warpspace.units import Array, Integers
 
 MOSTLY = 50.0  # percent of the volume
+SAMPLED_NODES = 11  # per axis at which machines are drawn, unless they verify statistics
 MOST_SHARES = 10  # errors that the table of the largest shares has
 
 
@@ -82,9 +83,10 @@ class Uncertainty(Analysis):
         if limit is None and not self.verify:
             return result
         worst, drawn = int(np.argmax(uncertainty.norm_um)), list[Array]()
-        for norm in uncertainty.machines(self.samples, self.seed):
-            summaries = _three(norm, grid.weights.reshape(-1)) if self.verify else ()
-            drawn.append(np.stack([norm[:, worst], *summaries, norm.max(axis=1)]))
+        nodes = selected_nodes(grid.shape, max(grid.shape) if self.verify else SAMPLED_NODES)
+        for norm in uncertainty.machines(self.samples, self.seed, np.append(nodes, worst)):
+            summaries = _three(norm[:, :-1], grid.weights.reshape(-1)) if self.verify else ()
+            drawn.append(np.stack([norm[:, -1], *summaries, norm.max(axis=1)]))
             watch(min(sum(part.shape[1] for part in drawn) / self.samples, 1.0))
         at_worst, *numbers = np.concatenate(drawn, axis=1)
         return replace(
@@ -93,6 +95,12 @@ class Uncertainty(Analysis):
             probability_everywhere=limit and float(np.mean(numbers[-1] <= limit)),
             montecarlo=dict(zip(NAMES, map(_spread, numbers), strict=True)) if self.verify else {},
         )
+
+
+def selected_nodes(shape: Sequence[int], most: int) -> Integers:
+    """Select nodes of a grid, evenly spaced, as flat indices: both ends and at most so many."""
+    lines = [np.linspace(0, size - 1, min(size, most)).round().astype(int) for size in shape]
+    return np.ravel_multi_index(np.ix_(*lines), shape).reshape(-1)
 
 
 def _three(norm: Array, weights: Array) -> tuple[Array, Array, Array]:

@@ -25,7 +25,7 @@ from warpspace.kinematics.model import Coordinates, Loop, Model
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import Covariance, ErrorFunction, ErrorSet, TableCurve
 from warpspace.scene.model import Scene, evaluate_grid
-from warpspace.units import Array
+from warpspace.units import Array, Integers
 
 NAMES = {"mean_um": "mean", "rms_um": "RMS", "p95_um": "P95", "max_um": "max"}
 COVERAGE = 0.9545  # of a normal distribution, within two standard deviations
@@ -398,18 +398,18 @@ class FieldUncertainty:
         gradient, fall = gradients[1] - gradients[0], float(squares[0] - squares[1])
         return float(self.errors.probability_within(fall, self.u95(gradient), 0.0, np.inf))
 
-    def machines(self, count: int, seed: int) -> Iterator[Array]:
-        """Draw machines from the covariance; yield |E| at every point, [n, N], in pieces."""
-        rng, points = np.random.default_rng(seed), self.norm_um.size
-        gains = np.moveaxis(self.response.reshape(-1, points, 3), -1, 0)
-        present = self.error_um.reshape(points, 3).T
-        step = max(1, MOST_DRAWN // points)
+    def machines(
+        self, count: int, seed: int, nodes: Integers | slice = slice(None)
+    ) -> Iterator[Array]:
+        """Draw machines from the covariance; yield |E| at some points, [n, N], in pieces."""
+        rng, shape = np.random.default_rng(seed), (-1, self.norm_um.size, 3)
+        layers = (self.response.reshape(shape), self.error_um.reshape(shape))
+        gains = np.moveaxis(np.concatenate(layers)[:, nodes], -1, 0).copy()
+        step = max(1, MOST_DRAWN // gains.shape[-1])
         for start in range(0, count, step):
             change = self.errors.draw(rng, min(step, count - start))
-            parts = (
-                change @ gain + component for gain, component in zip(gains, present, strict=True)
-            )
-            yield np.sqrt(sum(part**2 for part in parts))
+            parts = np.column_stack([change, np.ones(len(change))]) @ gains
+            yield np.sqrt(np.sum(np.square(parts, out=parts), axis=0))
 
 
 def field_uncertainty(
