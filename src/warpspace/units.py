@@ -38,6 +38,17 @@ def spell(value: float, digits: int = 3) -> str:
     return text.replace("-", MINUS)
 
 
+def spell_fixed(value: float, digits: int = 1) -> str:
+    """Format a result for people: µm and µrad with one decimal, a true minus; zero has no sign."""
+    return f"{round(value, digits) + 0.0:.{digits}f}".replace("-", MINUS)
+
+
+def spell_change(value: float, digits: int = 1) -> str:
+    """Format the change of a result with its sign; zero has none."""
+    text = spell_fixed(value, digits)
+    return f"+{text}" if round(value, digits) > 0.0 else text
+
+
 def spell_signed(value: float, digits: int = 3) -> str:
     """Format a change with its sign: ``+3.24``, ``−17.1``, ``0``."""
     return ("+" if value > 0.0 else "") + spell(value, digits)

@@ -234,7 +234,7 @@ def test_the_page_of_the_largest_grid_fits_a_mail_and_points_nowhere():
     text = page_of(FIRST, nodes=31)
     assert len(text.encode()) <= 3_000_000
     mean = offline_picture(FIRST, exaggeration=1000.0, nodes=31).statistics.mean_um
-    for words in (FIRST.title, "×1000", f"{mean:.2f} µm", "pitch of Y"):
+    for words in (FIRST.title, "×1000", f">{mean:.1f} µm", "pitch of Y"):
         assert words in text
     outer = re.sub(r'srcdoc="[^"]*"', "", text)
     assert not re.search(r"https?://|//\w+\.|\bsrc=|\bhref=", outer)

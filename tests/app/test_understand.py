@@ -231,7 +231,7 @@ def test_excluded_errors_are_neither_adjusted_nor_lost():
 def test_numbers_of_the_volume_and_gains_at_the_point_that_was_asked_about():
     opened = replace(START, page=replace(START.page, open=frozenset({"volume", "gains"})))
     html = html_of(lone_part(VolumePanel), opened)
-    for words in ("30.89 µm", "51.72 µm", "550 × 450 × 400 mm"):
+    for words in ("30.9 µm", "51.7 µm", "550 × 450 × 400 mm"):
         assert words in html
     part = lone_part(AnalysisPanel, "gains")
     assert "X 0, Y 0, Z −280" in settled(part, opened)

@@ -250,8 +250,8 @@ def check_sections(picture, mean, largest) -> None:
     limit = state.specification.limit_um
     if not picture.is_rotary:
         volume_text = text_of(VolumePanel(None).body(picture))
-        near(numbers_after(r"(?<!tilt, )mean", volume_text)[:1], mean, 2)
-        near(numbers_after(r"(?<!tilt, )max", volume_text)[:1], largest, 2)
+        near(numbers_after(r"(?<!tilt, )mean", volume_text)[:1], mean)
+        near(numbers_after(r"(?<!tilt, )max", volume_text)[:1], largest)
         assert LOOP_WORDS[drawn.loop] in volume_text
         worst = WorstPanel(None).heading(picture)
         if not picture.is_difference and drawn.controller is None:
@@ -296,8 +296,8 @@ def check_files(state: AppState) -> None:
     near(numbers_after("mean", heading)[:1], mean)
     near(numbers_after("max", heading)[:1], largest)
     if not picture.is_rotary and not picture.is_difference:
-        near(numbers_after("mean", column)[-1:], mean, 2)
-        near(numbers_after("max", column)[-1:], largest, 2)
+        near(numbers_after("mean", column)[-1:], mean)
+        near(numbers_after("max", column)[-1:], largest)
         assert limits_in(heading) == ({limit} if limit else set())
         assert ("no limit set" in heading) is (limit is None)
         assert LOOP_WORDS[picture.drawn_state.loop] in heading
@@ -310,8 +310,8 @@ def check_files(state: AppState) -> None:
     assert isinstance(cards, Cards)
     assert review.scenes[0].scene.title == picture.title
     stated = {name: float(value.split()[0]) for name, value, *_ in cards.cards}
-    near([stated["mean |E|"]], mean, rel=5e-3)  # three digits
-    near([stated["max"]], largest, rel=5e-3)
+    near([stated["mean |E|"]], mean)
+    near([stated["max"]], largest)
     words = text_of(lead.text)
     if not largest:
         assert "The error is zero" in words

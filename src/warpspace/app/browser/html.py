@@ -15,7 +15,7 @@ from markupsafe import Markup
 from warpspace.app.browser.actions import AnyAction
 from warpspace.resources import scenes_dir
 from warpspace.scene.library import scene_names
-from warpspace.units import MINUS
+from warpspace.units import spell_change, spell_fixed
 
 EMPTY = Markup("")
 
@@ -82,18 +82,7 @@ def upload_button(
     )  # fmt: skip
 
 
-def number(value: float, digits: int = 1) -> str:
-    """Format a number with a typographic minus; zero has no sign."""
-    text = f"{value:.{digits}f}"
-    if float(text) == 0.0:
-        text = text.lstrip("-")
-    return text.replace("-", MINUS)
-
-
-def signed(value: float, digits: int = 1) -> str:
-    """Format a number with its sign; zero has no sign."""
-    text = number(value, digits)
-    return text if text.startswith(MINUS) or not float(text.replace(MINUS, "-")) else f"+{text}"
+number, signed = spell_fixed, spell_change
 
 
 def lowered(text: str) -> Markup:

@@ -262,7 +262,7 @@ def _step_pieces(step: PageStep, title: str) -> tuple[Markup, Markup, Markup]:
         *(tag("p", text, class_="ws-warn") for text in picture.state.notes),
         legend.legend_html(picture),
         tag("b", lowered(f"{picture.length_words} over the volume")),
-        rows((name, f"{number(value, 2)} µm") for name, value in numbers.items()),
+        rows((name, f"{number(value)} µm") for name, value in numbers.items()),
         tag("p", " · ".join(point_texts)),
         tag("details", tag("summary", summary) + tag("table", listed),
             open=len(errors) <= MAX_UNFOLDED and not step.note),

@@ -197,7 +197,7 @@ class AnalysisPanel(Section):
                 text = "Applied to the displayed machine. Undo reverts it."
                 parts += [tag("p", text, role="status"), RECORD]
             elif stale and not is_automatic:
-                text = "Out of date: inputs have changed. do.Run again."
+                text = "Out of date: inputs have changed. Run again."
                 parts.append(tag("p", text, class_="ws-stale"))
             result, faded = outcome.result, stale and key != self._applied_key
             content = join((self.headline(result), self.cards_html(key), self.result_html(result)))

@@ -248,7 +248,7 @@ class VolumePanel(Section):
         statistics, state = picture.statistics, picture.drawn_state
         u95 = {} if picture.uncertainty is None else picture.uncertainty.statistics()
         intervals = {NAMES[key]: formatting.u95_behind(value) for key, value in u95.items()}
-        lines = [(name, f"{number(value, 2)}{intervals.get(name, '')} µm")
+        lines = [(name, f"{number(value)}{intervals.get(name, '')} µm")
                  for name, value in zip(NAMES.values(), statistics.four, strict=True)]  # fmt: skip
         if not picture.is_difference:
             # the picture holds it only if the map is coloured by it

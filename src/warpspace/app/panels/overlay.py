@@ -501,8 +501,8 @@ def comparison_html(compared: Compared) -> Markup:
     change, lines = compared.difference, list[Markup]()
     for label, name in ROWS.items():
         a, b = getattr(compared.a, name), getattr(compared.b, name)
-        node_by_node = "" if change is None else number(getattr(change, name), 2)
-        cells = (number(a, 2), number(b, 2), html.signed(b - a, 2), node_by_node)
+        node_by_node = "" if change is None else number(getattr(change, name))
+        cells = (number(a), number(b), html.signed(b - a), node_by_node)
         lines.append(tag("tr", tag("th", label) + join(
             tag("td", cell, data_compared=f"{label} {side}")
             for side, cell in zip(("A", "B", "change", "B − A"), cells, strict=True)

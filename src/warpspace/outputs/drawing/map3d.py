@@ -32,7 +32,7 @@ from warpspace.outputs.drawing.settings import SIZES
 from warpspace.outputs.drawing.sheet import DrawnMap
 from warpspace.picture.map_mesh import HATCH
 from warpspace.picture.model import Picture, map_faces
-from warpspace.units import MICROMETRE, Array, spell, spell_short
+from warpspace.units import MICROMETRE, Array, spell_fixed, spell_short
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +154,7 @@ def draw_corners(stage: Stage) -> None:
 
 def _amount(length_um: float, *, largest: bool) -> str:
     tail = " max" if largest and length_um > 0.0 else ""
-    return f"{spell(float(length_um))} {MICROMETRE}{tail}"
+    return f"{spell_fixed(float(length_um))} {MICROMETRE}{tail}"
 
 
 def _is_seen(stage: Stage, points_mm: Array) -> bool:

@@ -34,7 +34,7 @@ from warpspace.picture.model import (
 )
 from warpspace.picture.traces import TraceLine, evaluate_traces, trace_lines
 from warpspace.scene.model import Scene
-from warpspace.units import MICROMETRE, MINUS, Array, spell
+from warpspace.units import MICROMETRE, MINUS, Array, spell_fixed
 
 VOLUME_ALPHA, BEHIND_ALPHA = 0.72, 0.22
 """Opacity of the coloured volume in front of bodies, and behind them."""
@@ -236,8 +236,8 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     _label_traces(canvas, traces, projection, sheet.content)
     norms = np.concatenate([np.linalg.norm(trace.error_um, axis=-1) for trace in traces])
     rows: list[Row] = [
-        ("max |E|", f"{spell(largest)} {MICROMETRE}"),
-        ("mean |E|", f"{spell(float(norms.mean()))} {MICROMETRE}"),
+        ("max |E|", f"{spell_fixed(largest)} {MICROMETRE}"),
+        ("mean |E|", f"{spell_fixed(float(norms.mean()))} {MICROMETRE}"),
         ("max at", f"{spell_vector(nominal[int(np.argmax(norms))])} mm"),
         *((name, f"{spell_vector(point)} mm") for point, name in _points(traces).items()),
     ]
@@ -285,7 +285,7 @@ def _label_traces(
     for trace, line in zip(traces, spots, strict=True):
         away = np.argsort(-np.hypot(*(line - middle).T))
         name = f"{names[trace.trace.point_mm]} " if len(names) > 1 else ""
-        text = f"{name}{trace.trace.label}: {spell(trace.largest_um)} {MICROMETRE}"
+        text = f"{name}{trace.trace.label}: {spell_fixed(trace.largest_um)} {MICROMETRE}"
         text = text.replace("-", MINUS)
         placed = write_label(canvas, text, line[away[:24:4]], frame, occupancy, size=SIZES.small)
         if placed is not None:

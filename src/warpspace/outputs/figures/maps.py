@@ -33,7 +33,7 @@ from warpspace.outputs.drawing.sheet import (
 from warpspace.picture.formatting import IN_R, list_axes, quantity_words, spell_factor, spell_in_r
 from warpspace.picture.model import ScenePicture, Slice, map_faces, view_words
 from warpspace.scene.model import Scene
-from warpspace.units import MICRORADIAN, RAD_PER_URAD, Array, spell, spell_short
+from warpspace.units import MICRORADIAN, RAD_PER_URAD, Array, spell, spell_fixed, spell_short
 
 ISOLINE_STEP = "isolines every "
 
@@ -58,7 +58,7 @@ def draw_statistics(
     summary, values = picture.statistics, picture.values
     rows: list[Row] = [
         *_summary_rows(summary, "|E|", "µm"),
-        ("RMS", f"{spell(summary.rms_um)} µm"),
+        ("RMS", f"{spell_fixed(summary.rms_um)} µm"),
         *(_place_rows(summary) if summary.max_um > 0.0 else ()),
     ]
     marks = [("mean", summary.mean_um), ("P95", summary.p95_um), ("max", summary.max_um)]
@@ -66,7 +66,7 @@ def draw_statistics(
         marks.append(("limit", picture.scene.limit_um))
     if picture.component != "norm":
         low, high = float(values.min()), float(values.max())
-        span = f"{spell(low)} … {spell(high)} µm"
+        span = f"{spell_fixed(low)} … {spell_fixed(high)} µm"
         rows.insert(0, (f"{picture.component} component", span))
         marks = [("min", low), ("mean", float(values.mean())), ("max", high)]
     heading, bars = quantity_words(picture.component), (px_per_mm, picture.exaggeration)
@@ -89,7 +89,7 @@ def isoline_words(scale: ColourScale, values: Array | None = None) -> str:
 
 def _summary_rows(summary: Statistics, name: str, unit: str) -> list[Row]:
     values = {f"max {name}": summary.max_um, f"mean {name}": summary.mean_um, "P95": summary.p95_um}
-    return [(label, f"{spell(value)} {unit}") for label, value in values.items()]
+    return [(label, f"{spell_fixed(value)} {unit}") for label, value in values.items()]
 
 
 def _place_rows(summary: Statistics) -> list[Row]:
@@ -285,7 +285,7 @@ def _draw_needles(needles: Array, feet: surfaces.Index, stage: map3d.Stage) -> N
     for corner in surfaces.corners(stage.picture.shape):
         ends = needles[1, corner]
         if stage.split([ends])[0]:
-            text = f"{spell(float(tilt_urad[corner]))} {MICRORADIAN}"
+            text = f"{spell_fixed(float(tilt_urad[corner]))} {MICRORADIAN}"
             stage.label(text, [stage.projection.project(ends[1])])
 
 

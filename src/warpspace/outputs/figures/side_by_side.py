@@ -43,7 +43,7 @@ from warpspace.picture.model import (
     view_words,
 )
 from warpspace.scene.model import Scene, common_loop
-from warpspace.units import Array, spell, spell_count, spell_short, spell_signed
+from warpspace.units import Array, spell_change, spell_count, spell_fixed, spell_short
 
 
 def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
@@ -123,7 +123,7 @@ def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
         y -= canvas.px(28.0)
         canvas.text(start, y, name, colour=canvas.theme.muted)
         a, b, difference = (getattr(part, key) for part in summaries)
-        texts = (spell(a), spell(b), spell_signed(b - a), spell(difference))
+        texts = (spell_fixed(a), spell_fixed(b), spell_change(b - a), spell_fixed(difference))
         for x, text in zip(columns, texts, strict=True):
             canvas.text(x, y, text, ha="right")
 
@@ -180,7 +180,7 @@ def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: b
     for letter, cell, concept in zip(LETTERS, cells, concepts, strict=False):
         _draw_labels(canvas, cell, letter, concept)
     rows = [
-        (f"mean {letter}", f"{spell(one.sampled.mean_um)} µm")
+        (f"mean {letter}", f"{spell_fixed(one.sampled.mean_um)} µm")
         for letter, one in zip(LETTERS, concepts, strict=False)
     ]
     sheet.draw_panel(
@@ -244,7 +244,7 @@ def _draw_labels(canvas: Canvas, cell: Rect, letter: str, concept: Concept) -> N
     head, high = f"{letter}  {scene.title}", top - canvas.px(4.0)
     canvas.text(x, high, head, size=SIZES.heading, weight="bold", va="top", max_width=max_width)
     values = {"mean": sampled.mean_um, "P95": sampled.p95_um, "max": sampled.max_um}
-    numbers = [f"{name} {spell(value)} µm" for name, value in values.items()]
+    numbers = [f"{name} {spell_fixed(value)} µm" for name, value in values.items()]
     if sampled.probability is not None:
         conforming = 100.0 * sampled.probability.probability
         numbers.append(f"{conforming:.1f} % within {spell_short(sampled.probability.spec_um)} µm")

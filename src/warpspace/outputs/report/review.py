@@ -25,7 +25,7 @@ from warpspace.picture.comparison import scene_change, share_exaggeration
 from warpspace.picture.formatting import TIMES, list_axes, point_axes, spell_in_r, u95_behind
 from warpspace.picture.model import Exaggeration, ScenePicture, evaluate_picture, same_nodes
 from warpspace.scene.model import Scene, common_loop, second_order
-from warpspace.units import spell, spell_short, spell_signed
+from warpspace.units import spell_fixed, spell_short, spell_signed
 
 UM, PERCENT = "\N{NO-BREAK SPACE}µm", "\N{NO-BREAK SPACE}%"
 
@@ -89,7 +89,7 @@ class Reviewed:
     @property
     def largest(self) -> str:
         summary = self.statistics
-        return f"{spell(summary.max_um)}{_format_u95(summary, 'max_um')}{UM} at {self.worst_axes}"
+        return f"{_with_u95(summary, 'max_um')} at {self.worst_axes}"
 
     @property
     def verdict(self) -> Verdict:
@@ -183,9 +183,10 @@ def _review_scene(letter: str, picture: ScenePicture, settings: ReportSettings) 
     )
 
 
-def _format_u95(summary: Statistics, name: str) -> str:
+def _with_u95(summary: Statistics, name: str) -> str:
     u95 = summary.expanded_uncertainty
-    return u95_behind(u95[f"u95_{name}"]) if u95 else ""
+    behind = u95_behind(u95[f"u95_{name}"]) if u95 else ""
+    return spell_fixed(getattr(summary, name)) + behind + UM
 
 
 def _difference(first: ScenePicture, second: ScenePicture | None = None) -> Statistics | None:
@@ -219,8 +220,8 @@ def verdict(review: Review) -> str:
     comparison = f"{abs(100.0 * change):.0f}{PERCENT} {'less' if change < 0.0 else 'more'} than"
     if abs(change) < 0.005:
         comparison = "the same as"
-    comment = f"{comparison} A's {spell(a)}{UM}" if a else "that of A is zero"
-    return f"{''.join(verdicts)}The mean error of B is {spell(b)}{UM}: {comment}."
+    comment = f"{comparison} A's {spell_fixed(a)}{UM}" if a else "that of A is zero"
+    return f"{''.join(verdicts)}The mean error of B is {spell_fixed(b)}{UM}: {comment}."
 
 
 def _verdict_on(reviewed: Reviewed) -> str:
@@ -254,10 +255,9 @@ def _advice(picture: ScenePicture, adjustment: Result | str, settings: ReportSet
     scene, adjusted = adjustment.changes()[proposed].scene, adjustment.adjustments[proposed]
     after = evaluate_picture(scene, grid=settings.grid, loop=settings.loop)
     largest, rms = after.statistics.max_um, adjusted.rms_um
-    effect = (
-        f"the RMS changes from {spell(adjustment.before.rms_um)} to {spell(rms)}{UM}, the largest"
-        f" error from {spell(before)} to {spell(largest)}{UM}"
-    )
+    numbers = map(spell_fixed, (adjustment.before.rms_um, rms, before, largest))
+    effect = "the RMS changes from {} to {}{um}, the largest error from {} to {}{um}"
+    effect = effect.format(*numbers, um=UM)
     if limit is not None and largest <= limit:
         effect += ", within the limit"
     elif limit is not None:
@@ -279,7 +279,7 @@ def first_page(review: Review, picture: Block) -> list[Block]:
     for reviewed, limit in zip(review.scenes, limits, strict=True):
         summary = reviewed.statistics
         numbers = ("mean_um", "p95_um", "max_um", "rms_um")
-        rows.append([spell(getattr(summary, of)) + _format_u95(summary, of) + UM for of in numbers])
+        rows.append([_with_u95(summary, of) for of in numbers])
         if limited:
             rows[-1][-1] = "–" if limit is None else volume_share(reviewed.share_within)
     names.append("within the limit" if limited else "RMS")
