@@ -13,6 +13,9 @@ from scipy import stats
 
 import warpspace
 from products import pairwise
+from warpspace.analysis.blocks import blocks_html
+from warpspace.analysis.commands.concepts import Concepts
+from warpspace.analysis.commands.montecarlo import MonteCarlo
 from warpspace.analysis.sampling import cases, machine_sampling
 from warpspace.analysis.sampling import distribution as streams
 from warpspace.analysis.sampling.cases import BLOCK, Case, SamplingPlan, choose_cylinder
@@ -304,3 +307,18 @@ def test_all_zero_samples():
     stream.add(np.zeros(5))
     assert stream.mode_um() == 0.0
     assert stream.display_histogram().counts.tolist() == [5]
+
+
+@pytest.mark.parametrize("kind", [MonteCarlo, Concepts])
+def test_a_limit_is_that_of_the_scenes_unless_given(kind):
+    scene, other = (dataclasses.replace(SCENE, limit_um=at) for at in (100.0, 90.0))
+
+    def words(scenes, **options):
+        result = kind(samples=100, **options).run_all(scenes, lambda _: None)
+        return blocks_html(result.blocks())
+
+    assert "≤ 100 µm" in words([scene])
+    assert "≤ 80 µm" in words([scene], limit_um=80.0)
+    assert "≤ 100 µm" in words([scene, scene])
+    for scenes in ([scene, other], [dataclasses.replace(scene, limit_um=None)]):
+        assert "≤" not in words(scenes)

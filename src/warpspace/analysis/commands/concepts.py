@@ -97,6 +97,7 @@ class Concepts(machine_sampling.KeptLimit):
         low=LIMIT_UM[0],
         high=LIMIT_UM[1],
         flag="--limit",
+        unset="that of the scenes",
     )
     own_tolerances: bool = option(
         False, "Each scene with its own tolerances instead of those of the first one by class"
@@ -106,10 +107,12 @@ class Concepts(machine_sampling.KeptLimit):
         return self.run_all((scene,), watch)
 
     def run_all(self, scenes: Sequence[Scene], watch: ProgressCallback, /) -> "ConceptsResult":
+        limit_um = machine_sampling.limit_or_that_of(scenes, self.limit_um)
+        analysis = replace(self, limit_um=limit_um)
         progress = count_progress(watch, self.samples * len(scenes))
-        concepts = compare_concepts(scenes, self, progress=progress)
+        concepts = compare_concepts(scenes, analysis, progress=progress)
         left_out = sampled_second_order(*(concept.sampled for concept in concepts))
-        return ConceptsResult(analysis=self, concepts=concepts, second_order=left_out)
+        return ConceptsResult(analysis=analysis, concepts=concepts, second_order=left_out)
 
 
 @dataclass(frozen=True, kw_only=True)

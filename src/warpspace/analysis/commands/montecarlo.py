@@ -21,6 +21,7 @@ from warpspace.analysis.sampling.machine_sampling import (
     Execution,
     SampledMachines,
     SampleStatistics,
+    limit_or_that_of,
     montecarlo_each,
 )
 from warpspace.exceptions import OptionError, UnknownNameError
@@ -135,6 +136,7 @@ class MonteCarlo(SampledMachines):
         unit="µm",
         low=0.0,
         flag="--limit",
+        unset="that of the scenes",
     )
     tolerance: Steps = option(
         (),
@@ -153,6 +155,9 @@ class MonteCarlo(SampledMachines):
         /,
         **execution: Unpack[Execution],
     ) -> "MonteCarloResult":
+        limit_um = limit_or_that_of(scenes, self.limit_um)
+        if limit_um != self.limit_um:
+            return replace(self, limit_um=limit_um).run_all(scenes, watch, **execution)
         self.check_against(len(scenes))
         counted = count_progress(watch, self.machines(len(scenes)))
         progress = execution.get("progress")

@@ -10,7 +10,7 @@ does not grow with the number of samples.
 
 import os
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import closing, nullcontext
 from dataclasses import dataclass, replace
@@ -268,6 +268,12 @@ class SampledMachines(Sampled):
         self, reduction: Reduction, limit_um: float | None, nodes: int = cases.DEFAULT_NODES
     ) -> SamplingPlan:
         return SamplingPlan(self.samples, self.seed, reduction, nodes, limit_um, self.cylinder)
+
+
+def limit_or_that_of(scenes: Sequence[Scene], limit_um: float | None) -> float | None:
+    """Return a limit, else the one that all scenes state."""
+    stated = {scene.limit_um for scene in scenes}
+    return stated.pop() if limit_um is None and len(stated) == 1 else limit_um
 
 
 @dataclass(frozen=True, kw_only=True)
