@@ -20,7 +20,7 @@ from warpspace.outputs.figures.registry import draw_figure, figure_kinds
 from warpspace.picture.model import evaluate_picture
 from warpspace.picture.traces import trace_lines
 from warpspace.scene.library import parse_scene
-from warpspace.units import spell
+from warpspace.units import spell_fixed
 
 FIGURES = tuple(kind.name for kind in figure_kinds())
 MAPS = tuple(n for n in FIGURES if n not in ("gains", "montecarlo", "ballbar", "rotary"))
@@ -242,8 +242,8 @@ def test_traces_of_the_figure_hold_the_reference_point_still_like_the_export():
     drawing = draw_figure("traces", [scene], FigureSettings(size=(800, 600)))
     words = words_of(drawing)
     lines = trace_lines(evaluate_picture(scene, grid=3).traces)
-    found = {line.trace.label: spell(line.largest_um) for line in lines}
-    over_b = [spell(line.largest_um) for line in lines if line.trace.axis == "B"]
-    assert "2.23" in over_b
-    assert "4.53" not in words
+    found = {line.trace.label: spell_fixed(line.largest_um) for line in lines}
+    over_b = [spell_fixed(line.largest_um) for line in lines if line.trace.axis == "B"]
+    assert "2.2" in over_b
+    assert "4.5" not in words
     assert all(f"{value} µm" in words for value in found.values())
