@@ -30,7 +30,7 @@ from warpspace.scene.model import Scene
 
 SCENES = (
     *("dvf5000_first", "dvf5000_second", "teach_wobbling_table", "fork_head_bc"),
-    *("review_dvf5000", "part_on_dvf5000"),
+    *("review_dvf5000", "part_on_dvf5000", "ur10"),
 )
 UNCERTAIN = {
     "EAX": 1.0, "EAY": 3.0, "ECY": 2.0, "EAZ": 3.0, "EC0Y": 4.0, "EA0Z": 5.0, "EB0Z": 5.0,
@@ -122,6 +122,13 @@ def unfold(page: Page, title: str) -> None:
         "#ws-right summary, #ws-right [data-do*=fold_section]", has_text=title
     ).first.click()
     page.wait_for_timeout(PAUSE_MS)
+
+
+def solid(page: Page) -> None:
+    """Draw the machine as a solid."""
+    page.locator("[data-key='menu-machine'] summary").click()
+    page.get_by_role("button", name="solid", exact=True).click()
+    page.keyboard.press("Escape")
 
 
 def dark(page: Page) -> None:
@@ -261,6 +268,7 @@ VISITS = {
     "task_design": Visit(designed),
     "task_machine": Visit(turned, "teach_wobbling_table"),
     "rotary_axes": Visit(rotated, "teach_wobbling_table"),
+    "robot": Visit(solid, "ur10"),
     "task_import": Visit(imported),
     "window_report": Visit(reported),
     "review_notes": Visit(noted, "review_dvf5000"),
