@@ -53,7 +53,10 @@ class WorstPanel(Section):
             return self.title
         kind = self.title if picture.state.picked is None else "This point"
         explanation = self._explain(picture)
-        return f"{kind}: {number(explanation.length_um)}{length_words(explanation.uncertainty)} µm"
+        length_um = explanation.length_um
+        if picture.state.picked is None and not explanation.is_corrected:
+            length_um = picture.largest_um  # of first order, as in the heading of the page
+        return f"{kind}: {number(length_um)}{length_words(explanation.uncertainty)} µm"
 
     def body(self, picture: LivePicture) -> Markup:
         if picture.is_difference:
