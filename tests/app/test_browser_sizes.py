@@ -69,8 +69,17 @@ def settled(tab):
     return tab.still(lambda: extent(tab), 0.2)
 
 
+def filled_share(tab):
+    """The share of the free height or width that the box fills."""
+    box, found = extent(tab), tab.page.evaluate(BOXES)
+    width, height = box[2] - box[0], box[3] - box[1]
+    room = found["room"]
+    return max(width / (room[2] - room[0]), height / (found["foot"][1] - found["head"][3]))
+
+
 def check_page(tab):
     """See that nothing covers anything, and that the box fills its room."""
+    tab.until(lambda: filled_share(tab) > 0.5)  # the camera follows the page, sooner or later
     box = settled(tab)
     found = tab.page.evaluate(BOXES)
     head, room = found["head"], found["room"]
@@ -89,8 +98,7 @@ def check_page(tab):
     # between heading and controls, and filling what is left one way or the other
     free = [room[0], head[3], room[2], found["foot"][1]]
     assert within(box, free)
-    width, height = box[2] - box[0], box[3] - box[1]
-    assert max(width / (free[2] - free[0]), height / (free[3] - free[1])) > 0.5
+    assert filled_share(tab) > 0.5
 
 
 def camera(tab):
