@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from viser import ClientHandle
 
 from warpspace.app.drawing.labels import axes_room_mm
@@ -100,11 +101,8 @@ def fit_camera(
     margins: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
 ) -> CameraMemory:
     """Place a camera so that points fill the picture inside margins: left, right, top, bottom."""
-    flat = points_mm.reshape(-1, 3) * SCENE_PER_MM
-    backward = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
-    right = np.cross((0.0, 0.0, 1.0), backward)
-    right = right / np.linalg.norm(right)
-    up = np.cross(backward, right)
+    flat, axes = points_mm.reshape(-1, 3) * SCENE_PER_MM, _view_axes(direction, (0.0, 0.0, 1.0))
+    right, up, backward = axes.T
     half = np.tan(np.deg2rad(fov_deg) / 2.0) * np.array([max(aspect, 0.1), 1.0])
     before, after = np.array([margins[0], margins[3]]), np.array([margins[1], margins[2]])
     # middle and half size of the area to fill
@@ -112,7 +110,7 @@ def fit_camera(
     target, distance = (flat.min(axis=0) + flat.max(axis=0)) / 2.0, 1.0
     offset = np.zeros(2)
     for _ in range(_ROUNDS):
-        in_view = (flat - target) @ np.stack([right, up, backward], axis=1)
+        in_view = (flat - target) @ axes
         across, towards = in_view[:, :2], in_view[:, 2]
         from_middle = np.abs(across - offset + towards[:, None] * middle)
         distance = float(((from_middle / free).max(axis=1) + towards).max())
@@ -126,16 +124,20 @@ def fit_camera(
 
 def is_in_view(place: CameraMemory, points_mm: Array, aspect: float) -> bool:
     """Check if all points are in the picture of a camera."""
-    backward = np.subtract(place.position, place.look_at)
-    backward = backward / np.linalg.norm(backward)
-    right = np.cross(place.up, backward)
-    right = right / np.linalg.norm(right)
-    up = np.cross(backward, right)
-    from_eye = points_mm.reshape(-1, 3) * SCENE_PER_MM - np.array(place.position)
-    depth = -from_eye @ backward
+    axes = _view_axes(np.subtract(place.position, place.look_at), place.up)
+    seen = (points_mm.reshape(-1, 3) * SCENE_PER_MM - np.array(place.position)) @ axes
+    depth = -seen[:, 2]
     half = np.tan(place.fov_rad / 2.0) * np.array([aspect, 1.0]) * depth[:, None]
-    across = np.abs(from_eye @ np.stack([right, up], axis=1))
-    return bool((depth > 0.0).all() and (across <= half).all())
+    return bool((depth > 0.0).all() and (np.abs(seen[:, :2]) <= half).all())
+
+
+def _view_axes(direction: ArrayLike, up: ArrayLike) -> Array:
+    """Return right, up and backward of a camera as columns, [3, 3]; `direction` is backward."""
+    backward, upward = np.asarray(direction, dtype=float), np.asarray(up, dtype=float)
+    backward = backward / np.linalg.norm(backward)
+    right = np.cross(upward, backward)
+    right = right / np.linalg.norm(right)
+    return np.stack([right, np.cross(backward, right), backward], axis=1)
 
 
 def clipping(position: Array, points: Array, *, orthographic: bool) -> tuple[float, float]:

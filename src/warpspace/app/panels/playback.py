@@ -1,5 +1,6 @@
 """The playback bar: play, pause, scrub and speed of whatever the drawing can play."""
 
+import math
 from collections.abc import Mapping
 from functools import partial
 
@@ -201,4 +202,4 @@ def _read_number(text: str) -> float | None:
         value = float(text[:40])
     except ValueError:
         return None
-    return value if value == value else None  # noqa: PLR0124 - not a number
+    return None if math.isnan(value) else value
