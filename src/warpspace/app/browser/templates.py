@@ -1,6 +1,6 @@
 """HTML of the panels: macros of Jinja templates, one file a panel.
 
-`Templates("design").tolerances(rows=...)` renders the macro `tolerances` of `templates/design.html.j2`.
+`Templates("design").limit(value=...)` renders the macro `limit` of `templates/design.html.j2`.
 A macro knows the elements of `html.py` (`button`, `field`, `section` ...) and the actions as `do`.
 Every text that is not `Markup` is escaped, also what a macro receives; an unknown name is an error.
 """
