@@ -13,7 +13,7 @@ class Cache(Generic[T]):
     """Latest results of slow functions, up to a number of bytes."""
 
     def __init__(self, limit_bytes: int) -> None:
-        self._limit = limit_bytes
+        self.limit_bytes = limit_bytes
         self._items: OrderedDict[Hashable, tuple[T, int]] = OrderedDict()
         self._lock = threading.Lock()
 
@@ -26,7 +26,9 @@ class Cache(Generic[T]):
         value = build()
         with self._lock:
             self._items[key] = (value, size(value))
-            while len(self._items) > 1 and sum(n for _, n in self._items.values()) > self._limit:
+            while (
+                len(self._items) > 1 and sum(n for _, n in self._items.values()) > self.limit_bytes
+            ):
                 self._items.popitem(last=False)
         return value
 

@@ -28,13 +28,14 @@ from warpspace.picture.traces import TraceGroup, TraceLines, build_traces
 from warpspace.scene.model import grid_basis
 from warpspace.units import Array
 
-CACHE_BYTES = 400_000_000
 WITHIN_LIMIT = 0.27  # place on the scale of signed values: colour of values within the limit
 TRACE_SAMPLES = 73  # points along a trace: every five degrees of a turn
 Response: TypeAlias = tuple[tuple[Any, ErrorBasis], ...]
 """A grid, and the traces of rotary axes if any, each with its first-order response."""
 Start: TypeAlias = Mapping[str, float] | None
 """Errors as a drag began: residual errors are exact there, and of first order from there."""
+CACHE: Cache[Any] = Cache(400_000_000)
+"""Responses of the boxes of all tabs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +49,6 @@ class DrawnScale:
 
 class LiveModel:
     """Evaluates states into pictures; shared by all sessions, thread-safe."""
-
-    def __init__(self) -> None:
-        self._cache: Cache[Any] = Cache(CACHE_BYTES)
 
     def evaluate(self, state: AppState, drawn: DrawnScale | None = None) -> LivePicture:
         if drawn is not None:
@@ -69,7 +67,7 @@ class LiveModel:
     def _single(self, state: AppState, start: Start) -> LivePicture:
         rotary = state.rotary
         key = _place(state), rotary.off, rotary.own_mm, tuple(rotary.held.items())
-        response: Response = self._cache.get(key, lambda: _build(state), _size)
+        response: Response = CACHE.get(key, lambda: _build(state), _size)
         (grid, basis), *traces = response
         size = model.picture_size_mm(state.scene, grid)
         field = self._field(state, grid, basis, start)
@@ -125,7 +123,7 @@ class LiveModel:
             return field_uncertainty(scene, field.error_um, at, state.view(), point_mm)
 
         key = "uncertainty", Identity(grid), _place(state)
-        uncertainty = self._cache.get(key, build, lambda built: 3 * built.response.nbytes)
+        uncertainty = CACHE.get(key, build, lambda built: 3 * built.response.nbytes)
         axes, stated = loop_axes(scene.model, state.loop), uncertainty.errors.keys
         unstated = (key for key, value in state.active.items() if value and key not in stated)
         unknown = [key for key in unstated if parameter(key).axis in axes]
@@ -144,7 +142,7 @@ class LiveModel:
         if state.look.surface == "slices":
             for axis, at in slice_positions(scene, state.look, state.machine).items():
                 key = _place(state), axis, at
-                ((plane, basis),) = self._cache.get(key, partial(build, axis, at), _size)
+                ((plane, basis),) = CACHE.get(key, partial(build, axis, at), _size)
                 field = self._field(state, plane, basis, start)
                 known = self._uncertainty(state, plane, field)
                 drawn: dict[str, Any] = {**common, "field": field, "uncertainty": known}
@@ -168,7 +166,7 @@ class LiveModel:
         identities = Identity(controller), Identity(of), Identity(scene.model)
         key = *identities, positions, loop, state.view_key
         now = state.active_scene()
-        prepared = self._cache.get(
+        prepared = CACHE.get(
             key,
             lambda: controller.at(of.coordinates, of.nominal_mm, now, loop, point_mm),
             lambda found: found.nbytes,
@@ -177,7 +175,7 @@ class LiveModel:
             return prepared.field(now.errors)
         begun = replace(state, amplitudes=start)
         change = np.subtract([*begun.active.values()], [*state.active.values()])
-        exact = self._cache.get(
+        exact = CACHE.get(
             (*key, Identity(state.scene), tuple(begun.active.items())),
             lambda: prepared.field(begun.active_scene().errors),
             lambda field: 3 * field.error_um.nbytes,

@@ -33,7 +33,7 @@ MOST_POINTS = 300_000  # of a part, or of the path of a program, that the app dr
 MOST_SITES = 20_000  # places of one test
 PIECE = 20_000  # points evaluated at once, which limits the memory of intermediate arrays
 T = TypeVar("T")
-_CACHE: Cache[Any] = Cache(400_000_000)
+CACHE: Cache[Any] = Cache(400_000_000)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class SceneOverlay(Generic[T]):
         if controller is None:
             amplitudes = np.fromiter(state.active.values(), np.float32, len(state.amplitudes))
             return replace(self, error_um=(amplitudes @ self.response).reshape(-1, 3))
-        prepared = _CACHE.get(
+        prepared = CACHE.get(
             (Identity(controller), Identity(self)),
             lambda: controller.at(self.coordinates, point, scene, Loop.RELATIVE, point),
             lambda found: found.nbytes,
@@ -75,7 +75,7 @@ def _cached_overlay(
     """Build an overlay, or return it from the cache, with errors; None where it cannot be built."""
     key = Identity(state.scene), tuple(state.positions.items()), state.placed, arguments
     try:
-        overlay: SceneOverlay[T] = _CACHE.get(
+        overlay: SceneOverlay[T] = CACHE.get(
             key, lambda: build(state.standing), lambda found: found.response.nbytes
         )
         return overlay.with_errors(state)
