@@ -15,13 +15,14 @@ from table import Growth, Row, Section
 from timing import best
 
 from warpspace import load_scene
+from warpspace.app.browser import actions as do
 from warpspace.app.drawing.box import packed
-from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.evaluation.live_model import DrawnScale, LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.picture.map_mesh import map_mesh
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
-from page_client import App, Tab, running_app
+from page_client import App, Tab, running_app, said
 
 TABS, IDLE, SECONDS, RATE = 5, 15, 15.0, 20.0
 GROWING = (1, 2, 4, 8)
@@ -36,9 +37,10 @@ def expected() -> tuple[np.ndarray, dict[str, int]]:
     """Return the positions of the drag and the points that each must show."""
     values = np.linspace(-90.0, 90.0, POSITIONS).round(1)
     live, state = LiveModel(), start_state(load_scene("dvf5000_first"))
+    held = DrawnScale(live.evaluate(state).exaggeration)
+    pictures = [live.evaluate(state.with_amplitude(KEY, v), held) for v in values.tolist()]
     numbers = {
-        packed(map_mesh(live.evaluate(state.with_amplitude(KEY, v))).vertices_mm.astype("<f4")): i
-        for i, v in enumerate(values.tolist())
+        packed(map_mesh(picture).vertices_mm.astype("<f4")): i for i, picture in enumerate(pictures)
     }
     assert len(numbers) == POSITIONS, "positions cannot be told apart by their points"
     return values, numbers
@@ -57,7 +59,8 @@ class TabTimes:
 
 
 async def drag(tab: Tab, values: np.ndarray, seconds: float, rate: float) -> list[tuple]:
-    """Drag to and fro; give when which position was sent."""
+    """Hold the slider and drag to and fro; give when which position was sent."""
+    await tab.send(said(do.Signal.HOLD))
     sent, start, tick = [], time.perf_counter(), 0
     # tabs are not in step with each other
     await asyncio.sleep(np.random.default_rng(id(tab)).uniform(0.0, 1.0 / rate))

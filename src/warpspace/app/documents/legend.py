@@ -252,7 +252,7 @@ def subject_words(picture: LivePicture) -> list[str]:
         subjects.append(f"{edited} error{'s' if edited > 1 else ''} changed")
     if excluded:
         subjects.append(f"{excluded} excluded")
-    beyond = formatting.beyond_words(state.active_scene(), state.loop)
+    beyond = formatting.beyond_words(state.standing, state.loop)
     return [*subjects, *formatting.direction_words(state.scene), *filter(None, [beyond])]
 
 
@@ -287,7 +287,7 @@ def picture_conditions(picture: LivePicture) -> tuple[str, ...]:
 
     def of(state: AppState) -> tuple[str, ...]:
         view = (*formatting.direction_words(state.scene), *placed_words(state.view()))
-        remarks = table_words(state), formatting.beyond_words(state.active_scene(), state.loop)
+        remarks = table_words(state), formatting.beyond_words(state.standing, state.loop)
         return (*view, *state_conditions(state), *filter(None, remarks))
 
     if picture.is_difference and picture.compared is not None:

@@ -245,12 +245,12 @@ def measure_distance(picture: LivePicture) -> tuple[DistanceResult, Array, Array
 def _measure_distance(of: Identity) -> tuple[DistanceResult, Array, Array] | None:
     picture: LivePicture = of.target
     state, option_texts = picture.drawn_state, option_values(picture.state, Distance.name)
+    if not (option_texts.get("start") and option_texts.get("end")):
+        return None
     scene = state.active_scene()
     try:
         distance = read_form(Distance, Distance.options(), option_texts, scene)
         distance = replace(distance, loop=state.loop)
-        if not (distance.start and distance.end):
-            return None
         at = distance.places(scene, distance.corner)
         drawn_mm, field = drawn_field(state, at, exact=distance.exact)
         measurement = distance.between(scene, at, field)

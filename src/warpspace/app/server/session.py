@@ -393,8 +393,9 @@ class Session:
         actions = [context.events.popleft() for _ in range(len(context.events))]
         for action in actions:
             self._handle_page_action(action)
+            kind = do.kind_of(action)
             for panel in self.display.panels.values():
-                if panel.handles(action):
+                if kind in panel.handlers and panel.handles(action):
                     take = partial(panel.handle, action=action)
                     self.run_guarded(partial(context.apply, take))
         while context.actions:

@@ -91,6 +91,8 @@ def merged(old: AppState, new: AppState, present: AppState) -> AppState:
     Of the view, what has been changed since stays, unless the machine is another one. Raises
     `OptionError` where another tab has changed the same value.
     """
+    if present is old:
+        return replace(new, page=old.page, forms=old.forms)
     states, values = (old, new, present), dict[str, Any]()
     is_same_machine = all(
         _equal(getattr(old.scene, name), getattr(new.scene, name))
