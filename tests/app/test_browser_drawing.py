@@ -110,7 +110,8 @@ RECORD = """() => setInterval(() => {
   const { warpspaceMesh: mesh, __viserMutable: view } = window, seen = (window.risen ??= []);
   view?.nodeRefFromName?.["/box/surface"]?.traverse(part => {
     const at = part.geometry?.attributes.position;
-    if (at && mesh) seen.push([mesh.solid, Array.from(at.array.slice(0, 300))]);
+    const far = window.warpspaceViser?.cameraControl()?.distance;
+    if (at && mesh) seen.push([mesh.solid, Array.from(at.array.slice(0, 300)), far]);
   });
 }, 20)"""
 GREET = """() => {
@@ -137,14 +138,17 @@ def test_the_first_view_grows_from_true_scale_while_the_solid_machine_becomes_it
         shares = [
             float(np.mean((np.reshape(points, (-1, 3)) - true) * (drawn - true)))
             / float(np.mean((drawn - true) ** 2))
-            for _, points in seen
+            for _, points, _ in seen
         ]
         assert shares[-1] == pytest.approx(1.0, abs=1e-3)
         assert min(shares) < 0.5
-        while_growing = [(solid, share) for (solid, _), share in zip(seen, shares, strict=True)
+        while_growing = [(solid, share) for (solid, _, _), share in zip(seen, shares, strict=True)
                          if 0.0 < solid < 1.0]  # fmt: skip
         assert while_growing
         np.testing.assert_allclose([sum(pair) for pair in while_growing], 1.0, atol=1e-2)
+        far = [distance for *_, distance in seen if distance]
+        assert max(far) > 2.0 * far[-1], "it began with the whole machine"
+        assert not tab.session.context.camera.is_moved
         assert page.evaluate(GREET) == [1, 0], "a key ends it"
 
 

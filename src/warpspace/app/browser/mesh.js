@@ -113,6 +113,7 @@
         for (const name of SKIPS) removeEventListener(name, end, true);
         rising = null;
         this.show?.(1);
+        this.home?.();
         this.solid = 0;
         this.holdBack();
       };
@@ -122,11 +123,15 @@
       setTimeout(() => rising?.(), RISE_LATEST_MS);
       warpspacePage.send("rise");
     },
-    // from true scale to the errors drawn, while the solid machine becomes its ghost
-    rise(nominal, lines) {
+    // from true scale to the errors drawn, while the solid machine becomes its ghost and the camera
+    // comes from the whole machine to the box
+    rise([whole, box], nominal, lines) {
       const mesh = find("/box/surface", part => part.isMesh && part.geometry.attributes.color);
       const at = mesh?.geometry.attributes, from = nominal && floats(nominal), current = ++turn;
       if (!rising) return;
+      this.home = () => warpspaceFly(box, 0);
+      warpspaceFly(whole, 0);
+      warpspaceFly(box, RISE_MS);
       if (at && from?.length === at.position.array.length) {
         const place = at.position.array.slice(), shade = at.color.array.slice();
         hold(lines);

@@ -2,7 +2,8 @@
 
 import json
 from base64 import b64encode
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 from functools import partial
 from typing import Any
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.browser.page import Page
+from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.drawing.colours import (
     COLOURS,
     Rgb,
@@ -163,13 +165,18 @@ def only_bent(drawn: LivePicture, picture: LivePicture) -> bool:
     )  # fmt: skip
 
 
-def rise_script(picture: LivePicture) -> str:
-    """Build the script in which a box grows from true scale, `rise` of `mesh.js`."""
+def rise_script(picture: LivePicture, views: Sequence[CameraMemory]) -> str:
+    """Build the script in which a box grows from true scale, `rise` of `mesh.js`.
+
+    Meanwhile the camera moves from the first view to the second.
+    """
+    flight = json.dumps([asdict(view) for view in views])
     if not only_bent(picture, picture):
-        return "warpspaceMesh.rise(null);"
+        return f"warpspaceMesh.rise({flight});"
     drawn, flat = (map_mesh.map_mesh(of) for of in (picture, replace(picture, exaggeration=1.0)))
     lines = line_facts(picture, drawn.vertices_mm)["lines"]
-    return f'warpspaceMesh.rise("{packed(flat.vertices_mm.astype("<f4"))}",{json.dumps(lines)});'
+    nominal = packed(flat.vertices_mm.astype("<f4"))
+    return f'warpspaceMesh.rise({flight},"{nominal}",{json.dumps(lines)});'
 
 
 def line_facts(picture: LivePicture, vertices_mm: Array) -> dict[str, object]:

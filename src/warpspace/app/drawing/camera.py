@@ -235,6 +235,15 @@ class TabCamera:
         self._placements, self.has_followed = (*self._placements[-PLACEMENTS:], now, fitted), True
         return fitted
 
+    def approach(self, picture: LivePicture) -> tuple[CameraMemory, CameraMemory]:
+        """Return the views of the whole machine and of the box, for the page to move there."""
+        bodies = [of.vertices_mm for of in drawn_bodies(picture, nominal=True)]
+        points, room = np.concatenate([picture.drawn_mm.reshape(-1, 3), *bodies]), self.room
+        whole = fit_camera(points, room.aspect, VIEWS[self.view], self._fov_deg, room.margins)
+        box = self._fitted(picture)
+        self._placements = (*self._placements[-PLACEMENTS:], whole, box)
+        return whole, box
+
     def place(self, picture: LivePicture) -> None:
         """Move to the wanted view, else to one of the whole box."""
         memory, self.wanted = self.wanted, None

@@ -375,8 +375,9 @@ class Session:
             is_held, context = action is do.Signal.HOLD, self.context
             self._drag_start = context.picture if is_held else None
             context.held_since = context.changed_at if is_held else None
-        if action is do.Signal.RISE and self.context.picture is not None:
-            self.context.page.run_script(rise_script(self.context.picture))
+        if action is do.Signal.RISE and (picture := self.context.picture) is not None:
+            views = self.context.camera.approach(picture)
+            self.context.page.run_script(rise_script(picture, views))
         if not isinstance(action, do.TabHere) or self._is_identified:
             return
         self._is_identified = True
