@@ -10,8 +10,7 @@ from markupsafe import Markup
 
 from warpspace.analysis.registry import entries
 from warpspace.app.browser import actions as do
-from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button, join, rows, tag, text_box, upload_button
+from warpspace.app.browser.templates import Templates
 from warpspace.app.drawing.player import EXAGGERATION
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import machine_editor, overlay
@@ -24,7 +23,7 @@ from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog, accepte
 from warpspace.app.panels.improve import AdjustPanel, BestPanel, CompensatePanel
 from warpspace.app.panels.measurement import CalibratePanel, TestsPanel
 from warpspace.app.panels.note_panels import NoteNumbersPanel, NotesPanel, StoryPanel
-from warpspace.app.panels.panel import Context, Dialog, Panel, Refresh, Section, details, on, quiet
+from warpspace.app.panels.panel import Context, Dialog, Panel, Refresh, Section, on
 from warpspace.app.panels.playback import PlaybackPanel
 from warpspace.app.panels.upload_panels import ImportPanel, PartPanel, ProgramPanel
 from warpspace.app.state.app_state import AppState, Exclusions
@@ -34,6 +33,7 @@ from warpspace.bench.base import bench_names, find_test
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_UPLOAD_BYTES
 
+HTML = Templates("page")
 LONGEST_SENTENCE = 130
 
 
@@ -53,38 +53,14 @@ class TopPanel(Panel):
     name = "top"
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        store = self.context.store
+        store, state = self.context.store, picture.state
         steps = (("Undo", "↶", store.undoes, "Ctrl+Z"), ("Redo", "↷", store.redoes, "Ctrl+Shift+Z"))
-        history = (
-            button(sign, do.Signal(label.lower()), kind="quiet", aria_label=label, data_key=label,
-                   hint=f"{label}: {description} ({keys})")
-            for label, sign, description, keys in steps if description
-        )  # fmt: skip
-        hint = "Open a scene, measured errors, or a compensation table (Ctrl+O)"
-        state, title = picture.state, picture.state.scene.title or picture.state.scene.name
         count = sum(note.status == "open" for note in state.review)
-        notes = [
-            button(f"Notes ({count})" if count else "Notes", do.Signal.OPEN_NOTES, kind="quiet",
-                   data_key="notes", hint="Review notes; press N to pin one")
-        ] if state.review or state.page.notes else []  # fmt: skip
-        return {
-            "top": join((
-                tag("strong", "warpspace", class_="ws-brand"),
-                button(title, do.Input.OPEN_DIALOG("scenes"), kind="ws-scene",
-                       hint="Select another scene"),
-                upload_button("Open", "files", MAX_UPLOAD_BYTES, accepted_endings(), kind="quiet",
-                              hint=hint),
-                button("Save", do.Input.OPEN_DIALOG("files"), kind="quiet",
-                       hint="Save scene, figures and exports"),
-                button("Share", do.Share(), kind="quiet", hint="Copy a link to this view"),
-                button("Report", do.Input.OPEN_DIALOG("report"), kind="quiet"),
-                *notes,
-                tag("span", "", class_="ws-fill"),
-                *history,
-                button("?", do.Input.OPEN_DIALOG("help"), kind="quiet", aria_label="Help",
-                       hint="Help (H)"),
-            ))
-        }  # fmt: skip
+        notes = f"Notes ({count})" if count else "Notes"
+        return {"top": HTML.top(
+            state.scene.title or state.scene.name, accepted_endings(), MAX_UPLOAD_BYTES,
+            notes if state.review or state.page.notes else "", steps,
+        )}  # fmt: skip
 
 
 class ScenesDialog(Dialog):
@@ -94,19 +70,12 @@ class ScenesDialog(Dialog):
 
     def body(self, picture: LivePicture) -> Markup:
         bundled = {id(scene): scene.name for scene in self.context.scenes.fixed}
-        scenes = (
-            tag("button", html.thumbnail(bundled.get(id(scene), "")) + tag("span", join((
-                tag("b", title),
-                tag("small", scene.machine.title) if scene.machine.title != title else EMPTY,
-                tag("small", shorten(re.split(r"\.\s", scene.description)[0].rstrip(" .\n"),
-                                     LONGEST_SENTENCE, placeholder=" …"))
-                if scene.description else EMPTY,
-            ))), type="button", data_do=do.Input.CHOOSE_SCENE(title),
-                aria_current="true" if scene is picture.state.origin else None)
+        return HTML.scenes(
+            (title, bundled.get(id(scene), ""), scene.machine.title,
+             shorten(re.split(r"\.\s", scene.description)[0].rstrip(" .\n"), LONGEST_SENTENCE,
+                     placeholder=" …"), scene is picture.state.origin)
             for title, scene in self.context.scenes.items()
         )  # fmt: skip
-        hint = quiet("To open a file, use Open in the top bar, or drop it on the page.")
-        return tag("div", join(scenes), class_="ws-list ws-scenes", data_list=True) + hint
 
     @on(do.Input.CHOOSE_SCENE)
     def choose(self, state: AppState, title: str) -> AppState | None:
@@ -235,26 +204,9 @@ class HelpDialog(Dialog):
         return sorted(matching, key=lambda command: not matches(command.label.lower()))
 
     def body(self, picture: LivePicture) -> Markup:
-        query, scene = picture.state.page.command, picture.state.scene
-        label = "Find a command"
-        box = text_box(do.SetLeaf("page.command"), query, label=label, placeholder=label, live=True,
-                       data_enter=do.Input.RUN_FIRST_COMMAND(), autofocus=True)  # fmt: skip
-        commands = join(
-            tag("button", tag("kbd", command.key_label) + command.label, type="button",
-                data_do=do.Input.RUN_COMMAND(command.label))
-            if command.action not in IN_PAGE
-            else tag("p", tag("kbd", command.key_label) + command.label)
-            for command in self._find_commands(query)
-        ) or quiet(f"No command matches “{query}”.")  # fmt: skip
-        about = " ".join(scene.description.split())
-        return join((
-            tag("div", box + tag("div", commands, class_="ws-list ws-columns"), data_list=True),
-            tag("h3", "Mouse and keyboard"), rows(FIRST_HELP, "ws-keys"),
-            tag("h3", "Legend"), rows(MEANINGS, "ws-keys"),
-            quiet("Keys are active except while text is entered. After an interruption of the"
-                " connection, the state of a tab is available for ten minutes."),
-            *((tag("h3", scene.title), tag("p", about)) if about else ()),
-        ))  # fmt: skip
+        query = picture.state.page.command
+        return HTML.help(query, self._find_commands(query), IN_PAGE, FIRST_HELP, MEANINGS,
+                         picture.state.scene)  # fmt: skip
 
     @on(do.Input.RUN_COMMAND)
     def run(self, state: AppState, label: str) -> AppState | None:
@@ -383,32 +335,11 @@ class TasksPanel(Panel):
         }
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        task = picture.state.page.task
-        tabs = join(
-            tag(
-                "span", words, role="tab", id=f"ws-task-{name}", class_="ws-tab",
-                data_do=do.SetLeaf("page.task", name), tabindex=0 if name == task else -1,
-                aria_selected=str(name == task).lower(), aria_controls="ws-task",
-            )
-            for name, words in TASKS.items()
-        )  # fmt: skip
-        names = self.sections.get(task, ())
-        places = _places(name for name in names if name not in RARE)
-        rare = _places(name for name in names if name in RARE)
-        if rare:
-            is_open = not picture.state.page.open.isdisjoint(RARE.intersection(names))
-            places += details("More analyses", rare, kind="more", data_key=f"more.{task}",
-                              open=is_open)  # fmt: skip
-        return {
-            "tasks": tag("h2", "Tasks", class_="ws-heard")
-            + tag("div", tabs, role="tablist", aria_label="Tasks", class_="ws-tabs")
-            + tag("div", places, id="ws-task", role="tabpanel", aria_labelledby=f"ws-task-{task}",
-                  data_key=f"task-{task}")
-        }  # fmt: skip
-
-
-def _places(names: Iterable[str]) -> Markup:
-    return join(tag("div", "", data_piece=f"section.{name}") for name in names)
+        page = picture.state.page
+        names = self.sections.get(page.task, ())
+        rare = [name for name in names if name in RARE]
+        is_open = not page.open.isdisjoint(rare)
+        return {"tasks": HTML.tasks(page.task, TASKS, names, rare, is_open)}
 
 
 def build_panels(context: Context) -> list[Panel]:
