@@ -24,9 +24,10 @@ from viser import ClientHandle, ViserServer
 from warpspace.analysis.description import Result
 from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button, join, tag, text_box
+from warpspace.app.browser.html import EMPTY, join, tag, text_box
 from warpspace.app.browser.incoming import Events
 from warpspace.app.browser.page import Page
+from warpspace.app.browser.templates import Templates
 from warpspace.app.documents.output_services import CancelledError, Services
 from warpspace.app.documents.scene_file import MOST_OPENED, SceneList
 from warpspace.app.drawing.camera import CameraMemory, TabCamera, focus
@@ -39,6 +40,7 @@ from warpspace.app.state.tree import LONGEST, leaves, spell, value
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.scene.notes import story
 
+HTML = Templates("panel")
 MOST_FILES = 16  # that may wait for the session; likewise jobs
 PAUSE_S = 0.1  # without changes: longer than between two moves of a drag
 
@@ -303,14 +305,8 @@ class Section(Panel):
         is_open = self.is_open(picture.state)
         body = self.body(picture) if is_open else EMPTY
         title = self.heading(picture) if is_open else self.title
-        section = html.fold(
-            self.name,
-            title,
-            body,
-            opens=do.Input.FOLD_SECTION(self.name),
-            open_=is_open,
-            hint=self.sentence,
-        )
+        opens = do.Input.FOLD_SECTION(self.name)
+        section = html.fold(self.name, title, body, opens=opens, open_=is_open, hint=self.sentence)
         return {f"section.{self.name}": section}
 
 
@@ -329,12 +325,7 @@ class Dialog(Panel):
         raise NotImplementedError
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        close = button(
-            "✕", do.Signal.CLOSE_DIALOG, kind="quiet", hint="Close (Esc)", aria_label="Close"
-        )
-        head = tag("header", tag("h2", self.title, id="ws-window-title") + close)
-        body = tag("div", self.body(picture), class_="ws-body", data_key=f"window-{self.name}")
-        return {"window": head + body}
+        return {"window": HTML.dialog(self.name, self.title, self.body(picture))}
 
 
 def actions(*buttons: Markup) -> Markup:
@@ -442,13 +433,8 @@ class Jobs:
         job = self._job
         if job is None:
             return EMPTY
-        share = html.number(100.0 * job.share, 0) if job.share else None
-        bar = tag("progress", "", max=100, value=share, aria_label=job.name)
-        label = f"{job.name}: {share} %" if share else f"{job.name} …"
-        if self._waiting:
-            label += f" Then: {', '.join(name for name, _ in self._waiting)}"
-        cancel = button("Cancel", do.Cancel(self._panel.name))
-        return tag("div", join((bar, tag("span", label), cancel)), class_="ws-actions ws-run")
+        share = html.number(100.0 * job.share, 0) if job.share else ""
+        return HTML.progress(job.name, share, [name for name, _ in self._waiting], self._panel.name)
 
     def _run(self, job: Job, work: Callable[[Job], None]) -> None:
         error = None

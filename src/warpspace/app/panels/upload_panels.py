@@ -15,8 +15,9 @@ from warpspace.analysis.options import Grammar, Option, option, typed_word
 from warpspace.analysis.registry import Entry
 from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button, join, tag, upload_button
+from warpspace.app.browser.html import EMPTY, button
 from warpspace.app.browser.incoming import index_of
+from warpspace.app.browser.templates import Templates
 from warpspace.app.documents.transfers import IN_BOX, upload_text
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import AT_LINE, moved_place, part_overlay
@@ -24,7 +25,7 @@ from warpspace.app.panels.analysis_panel import ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.file_dialogs import accepted_endings
 from warpspace.app.panels.measurement import MOST_BYTES, FilesPanel, UploadedFile
-from warpspace.app.panels.panel import Context, actions, on, quiet, setting
+from warpspace.app.panels.panel import Context, on, setting
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
 from warpspace.app.state.form_values import option_values, read_form
@@ -41,6 +42,7 @@ from warpspace.scene.model import Scene
 from warpspace.scene.text_files import decode_text
 from warpspace.units import Array
 
+HTML = Templates("uploads")
 NAME = "import"
 MOST_FILES = 16  # read together
 MOST_CURVES, MOST_POINTS = 12, 400
@@ -183,13 +185,8 @@ class ImportPanel(FilesPanel):
         return True
 
     def before_result(self, state: AppState) -> Markup:
-        kind = "" if self.files else "main"
-        upload = upload_button(
-            "Import a file", "files", MAX_UPLOAD_BYTES, accepted_endings(), kind=kind,
-            hint="Files that belong together can be added one after the other",
-        )  # fmt: skip
-        introduction = EMPTY if self.files else tag("p", INTRODUCTION)
-        return introduction + self.files_html() + actions(upload)
+        introduction = "" if self.files else INTRODUCTION
+        return HTML.errors(self.files_html(), introduction, accepted_endings(), MAX_UPLOAD_BYTES)
 
     def result_html(self, result: description.Result) -> Markup:
         return details_html(block for block in result.blocks() if not isinstance(block, str))
@@ -285,19 +282,9 @@ class SceneOverlayPanel(FilesPanel):
 
     def before_result(self, state: AppState) -> Markup:
         content, name = (getattr(state.part, field) for field in self.part_fields)
-        upload = html.upload_button(
-            f"Another {self.name} …" if content else f"{self.title} …", self.name, self.most_bytes,
-            ",".join(IN_BOX[self.name]), kind="" if content else "main",
-            hint=f"At most {self.most_bytes >> 20} MB; files can also be dropped on the page",
-        )  # fmt: skip
-        missing = "is not loaded: links and saved scenes store only its name. Open it again."
-        about = quiet(f"{name} {missing}") if name else EMPTY
-        if content:
-            remove = button(
-                "✕", do.RemoveOverlay(self.name), kind="link", aria_label=f"Remove {name}"
-            )
-            about = tag("p", join((tag("b", name), " ", remove))) + self.about(state)
-        return join((about, self.files_html(), actions(upload)))
+        about = EMPTY if content is None else self.about(state)
+        return HTML.overlay(self.name, self.title, content, name, about, self.files_html(),
+                            self.most_bytes, ",".join(IN_BOX[self.name]))  # fmt: skip
 
     def show(self, content: object, name: str, **changes: Any) -> None:
         def update(state: AppState) -> AppState:
@@ -334,15 +321,7 @@ class PartPanel(SceneOverlayPanel):
         return {"place": part.place, "mesh": part.mesh, **files}
 
     def about(self, state: AppState) -> Markup:
-        turns = (button(f"{axis} 90°", do.TurnPart(axis), kind="choice",
-                        hint=f"Rotate by 90° about the workpiece axis {axis}, in place")
-                 for axis in AXES)  # fmt: skip
-        return join((
-            actions(tag("span", "Rotate about"), *turns),
-            *(setting(state, f"part.{name}") for name in ("place", "shown", "normal", "moved")),
-            html.upload_button("Tolerances …", self.name, MAX_SCENE_BYTES, ".toml",
-                               hint="Names and tolerances of the features"),
-        ))  # fmt: skip
+        return HTML.part(AXES, partial(setting, state), MAX_SCENE_BYTES)
 
     def result_html(self, result: description.Result) -> Markup:
         *_, features = (block for block in result.blocks() if isinstance(block, Table))
@@ -387,9 +366,7 @@ class ProgramPanel(SceneOverlayPanel):
     def about(self, state: AppState) -> Markup:
         line, text = state.forms.get(AT_LINE, ""), (state.part.program or "").splitlines()
         at = index_of(line, len(text) + 1)
-        if not at:
-            return EMPTY
-        return tag("p", join((tag("b", line), " ", tag("code", text[at - 1][:MOST_LETTERS]))))
+        return HTML.line(line, text[at - 1][:MOST_LETTERS]) if at else EMPTY
 
     def result_html(self, result: description.Result) -> Markup:
         def link(line: int) -> Markup:
