@@ -103,10 +103,6 @@ def sample_curve(function: ErrorFunction, span: tuple[float, float]) -> tuple[Ar
 # --- The row of an error --------------------------------------------------------------------------
 
 MOST_READINGS = 400  # drawn, evenly spaced
-TYPING = (
-    "Separate numbers by blanks, tabs or semicolons; use a decimal point or comma. Cells of a"
-    " spreadsheet can be pasted, CSV files dropped here."
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +129,7 @@ def _editor(row: Parameter, function: ErrorFunction, feedback: CurveEditFeedback
         n_lines = min(max(feedback.text.count("\n") + 1, 2), 8)
     kinds = dict(zip(titles, titles, strict=True))
     columns = function.row_words
-    return HTML.editor(row, function.title, kinds, columns, feedback, n_lines, TYPING)
+    return HTML.editor(row, function.title, kinds, columns, feedback, n_lines)
 
 
 def edit_curve(state: AppState, action: do.EditCurve) -> tuple[AppState, CurveEditFeedback | None]:

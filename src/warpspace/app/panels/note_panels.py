@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TypeAlias
 
 from markupsafe import Markup
 
@@ -261,32 +260,11 @@ NOTE_FACTS = note_tables.spell_place, note_tables.spell_numbers, note_tables.spe
 
 def _list_html(state: AppState) -> Markup:
     return HTML.notes(partial(setting, state), state.review, state.page.notes, story(state.review),
-                      _fact_words, _buttons, MAX_NOTE_TEXT)  # fmt: skip
+                      _fact_words, MAX_NOTE_TEXT)  # fmt: skip
 
 
 def _fact_words(note: Note) -> str:
     return " · ".join(filter(None, (spell(note) for spell in NOTE_FACTS)))
-
-
-Row: TypeAlias = tuple[str, do.AnyAction, str, object]  # label, action, hint, whether enabled
-
-
-def _buttons(note: Note, steps: Sequence[Note]) -> tuple[Row, ...]:
-    """List the buttons of a note; a note with conflicting versions cannot be edited."""
-    is_done, free = note.status == "done", not note.versions
-    place, change = steps.index(note) if note.step else 0, free and note.change
-    edit = partial(do.EditNote, note.id)
-    return (
-        ("Done", edit("status"), "Mark as open" if is_done else "Mark as done", free),
-        ("Show", do.Input.SHOW_NOTE(note.id), "Restore view, errors and camera of the note", True),
-        ("Edit", edit("edit"), "", free),
-        ("Delete", edit("delete"), "", True),
-        ("Revert", edit("revert"), "Restore the values before this decision", change),
-        ("Add to story", edit("add"), "", free and not note.step),
-        ("↑", edit("up"), "Earlier in the story", free and place > 0),
-        ("↓", edit("down"), "Later in the story", free and note.step and note != steps[-1]),
-        ("Remove from story", edit("out"), "", free and note.step),
-    )
 
 
 class NoteNumbersPanel(Panel):

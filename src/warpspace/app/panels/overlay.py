@@ -13,7 +13,7 @@ from markupsafe import Markup
 from warpspace.analysis.uncertainty.propagation import NOT_STATED
 from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button, fill, join, menu, tag, text_box
+from warpspace.app.browser.html import EMPTY, join, tag
 from warpspace.app.browser.templates import Templates
 from warpspace.app.browser.viser_private import queued
 from warpspace.app.documents import legend
@@ -49,32 +49,19 @@ class HeadPanel(Panel):
     _subject: object = None  # of the latest heading
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        subjects, place = legend.subject_words(picture), legend.place_words(picture)
-        head = fill(
-            '<div data-piece="reopened"></div>'
-            '<h1>{largest}<span data-piece="head.cause"></span></h1>'
-            '<div class="ws-numbers"><b>{numbers}</b> <small>{loop}</small></div>'
-            '<div>{place}<span data-piece="head.kept"></span></div>'
-            '<div data-piece="head.allowed"></div>{words}<div data-piece="head.order"></div>',
-            largest=legend.largest_words(picture), numbers=legend.numbers_words(picture),
-            loop=legend.loop_words(picture), place=place,
-            words=(tag("p", " · ".join(subjects), class_="ws-subject") if subjects else EMPTY)
-            + (EMPTY if picture.is_rotary else legend.part_html(picture)) + _rotary_offer(picture),
+        axis = parameter(picture.state.page.row).axis if picture.state.page.row else ""
+        is_offered = axis and not is_linear(axis) and not picture.is_rotary
+        head = HTML.head(
+            legend.largest_words(picture), legend.numbers_words(picture),
+            legend.loop_words(picture), legend.place_words(picture),
+            " · ".join(legend.subject_words(picture)),
+            EMPTY if picture.is_rotary else legend.part_html(picture), axis if is_offered else "",
         )  # fmt: skip
         subject = (Identity(picture.drawn_state.scene), picture.is_rotary, picture.is_difference,
                    picture.largest_um > 0.0)  # fmt: skip
         late = () if subject == self._subject else ("head.order", "head.allowed", "head.cause")
         self._subject = subject
         return {"head": head, **dict.fromkeys(late, EMPTY)}  # `OrderPanel` writes them later
-
-
-def _rotary_offer(picture: LivePicture) -> Markup:
-    """Offer the drawing of the rotary axes after a change of an error of one."""
-    axis = parameter(picture.state.page.row).axis if picture.state.page.row else ""
-    if picture.is_rotary or not axis or is_linear(axis):
-        return EMPTY
-    show = button("show its traces", do.ShowDrawing("rotary"), kind="link")
-    return tag("p", join((f"{axis} is a rotary axis: ", show)))
 
 
 class LegendPanel(Panel):
@@ -89,11 +76,8 @@ class LegendPanel(Panel):
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         limit_menu = EMPTY
         if not picture.is_difference and not picture.is_rotary:
-            share, kind = legend.within_limit_words(picture)
-            name, limit = "specification.limit_um", spell_limit(picture.state)
-            box = text_box(do.SetLeaf(name), limit, size="short", label="Limit", id="ws-limit")
-            body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
-            limit_menu = menu(share, body, key="limit", hint="Change the limit", kind=kind)
+            words = legend.within_limit_words(picture)
+            limit_menu = HTML.limit(*words, spell_limit(picture.state))
         return {"head.kept": limit_menu, "legend": legend.legend_html(picture)}
 
 
@@ -242,12 +226,7 @@ class PointerPanel(Panel):
 
 # --- The toolbar: display of the volume, view direction -------------------------------------------
 
-VIEWS = {"iso": "Iso", "front": "Front", "right": "Right", "top": "Top"}
 FACTORS = (1, 100, 1000, 10_000, 100_000)
-SWITCHES = (
-    "look.worst", "look.arrows", "look.isolines", "shown.grid_lines", "shown.ghost", "shown.axes",
-    "shown.traces", "look.bars", "shown.dark",
-)  # fmt: skip
 
 
 def chosen_map(state: AppState) -> str:
@@ -271,7 +250,7 @@ class ControlsPanel(Panel):
             menus.insert(0, HTML.drawings(DRAWINGS, "rotary" if state.shows_rotary else "volume"))
         if not picture.is_rotary:
             menus += [_surface(picture), HTML.machine(state.machine, partial(setting, state))]
-        return {"controls": join(menus), "triad": HTML.triad(VIEWS, self.context.camera)}
+        return {"controls": join(menus), "triad": HTML.triad(self.context.camera)}
 
     @on(do.Input.COLOUR_BY)
     def colour_by(self, state: AppState, quantity: str) -> AppState:
@@ -343,21 +322,17 @@ def _colours(picture: LivePicture) -> Markup:
 
 
 def _surface(picture: LivePicture) -> Markup:
-    state, chosen, switches = picture.state, picture.state.look.surface, SWITCHES
-    if picture.uncertainty is not None:
-        switches += ("look.significant", "look.ellipsoids", "look.unmeasured")
+    state, chosen = picture.state, picture.state.look.surface
     is_sliced, direction = chosen == "slices", state.scene.model.direction
     axes = slice_positions(state.scene, state.look, state.machine) if is_sliced else ()
     has_directions = state.scene.errors.has_directions or direction != TravelDirection.MEAN
     directions = {str(travel): label for travel, label in DIRECTION_WORDS.items()}
-    return HTML.surface(SURFACES, chosen, partial(setting, state), axes, switches,
+    return HTML.surface(SURFACES, chosen, partial(setting, state), axes, picture.uncertainty,
                         state.loop is Loop.RELATIVE, directions if has_directions else {},
                         str(direction))  # fmt: skip
 
 
 # --- Comparison -----------------------------------------------------------------------------------
-
-ROWS = {"mean": "mean_um", "RMS": "rms_um", "P95": "p95_um", "max": "max_um"}
 
 
 class ComparePanel(Panel):
@@ -376,13 +351,10 @@ class ComparePanel(Panel):
         b = NOBODY if chosen.b is None else chosen.b.title
         sides = ("a", chosen.a.title, titles), ("b", b, {NOBODY: NOBODY, **titles})
         label = "compare" if compared is None else COMPARISON_VIEWS[compared.view]
-        statistics = () if compared is None else (compared.a, compared.b, compared.difference)
-        lines = [(row, *(of and getattr(of, name) for of in statistics))
-                 for row, name in ROWS.items()]  # fmt: skip
         views = compared and HTML.displayed_side(compared, COMPARISON_VIEWS)
         ghost = setting(state, "comparison.ghost")
         return {"compared": views or EMPTY,
-                "compare": HTML.comparison(label, sides, ghost, compared, lines)}  # fmt: skip
+                "compare": HTML.comparison(label, sides, ghost, compared)}  # fmt: skip
 
     @on(do.Signal.OPEN_COMPARISON, later=True)
     def open(self) -> None:

@@ -154,23 +154,6 @@ IN_PAGE = do.Signal.FIND_ERROR, do.Signal.CHOOSE_FILES
 """Commands that a script of the page carries out."""
 
 
-FIRST_HELP = (
-    ("Rotate, pan, zoom", "drag, drag with the right button, wheel"),
-    ("Contributions at a point", "click it on the volume"),
-    ("Enter an exact number", "type digits while a slider has the focus"),
-    ("Next control, activate it", "Tab, then Enter or Space"),
-    ("Move the camera", "A S D Q E"),
-)
-MEANINGS = (
-    ("Solid box", "working volume, each point displaced by its error × exaggeration"),
-    ("Dashed box", "nominal working volume, without errors"),
-    ("Exaggeration", "display factor of the errors; numbers are not exaggerated"),
-    ("Colours", "magnitude or a component (x, y, z) of the error, in the unit of the colour bar"),
-    ("Error", "actual − nominal; a correction has the opposite sign"),
-    ("Mean, P95, max", "statistics of the magnitude of the error over the working volume"),
-)
-
-
 def _section_commands(sections: Iterable[Section]) -> Iterator[Command]:
     """List the commands that open a section of a task, or choose a standard test."""
     for section in sections:
@@ -205,8 +188,7 @@ class HelpDialog(Dialog):
 
     def body(self, picture: LivePicture) -> Markup:
         query = picture.state.page.command
-        return HTML.help(query, self._find_commands(query), IN_PAGE, FIRST_HELP, MEANINGS,
-                         picture.state.scene)  # fmt: skip
+        return HTML.help(query, self._find_commands(query), IN_PAGE, picture.state.scene)
 
     @on(do.Input.RUN_COMMAND)
     def run(self, state: AppState, label: str) -> AppState | None:

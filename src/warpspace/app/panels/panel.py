@@ -305,9 +305,7 @@ class Section(Panel):
         is_open = self.is_open(picture.state)
         body = self.body(picture) if is_open else EMPTY
         title = self.heading(picture) if is_open else self.title
-        opens = do.Input.FOLD_SECTION(self.name)
-        section = html.fold(self.name, title, body, opens=opens, open_=is_open, hint=self.sentence)
-        return {f"section.{self.name}": section}
+        return {f"section.{self.name}": HTML.section(self, title, body, is_open)}
 
 
 class Dialog(Panel):

@@ -51,10 +51,6 @@ SIGNS = {
     "correction": "corrections (added by the controller)",
 }
 DIRECTIONS = {FORWARD: "forward", BACKWARD: "backward", UNDIRECTED: "mean"}
-INTRODUCTION = (
-    "Measured errors or compensation tables of a controller. Changes are previewed before they are"
-    " applied. Files can also be dropped on the page."
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,8 +181,8 @@ class ImportPanel(FilesPanel):
         return True
 
     def before_result(self, state: AppState) -> Markup:
-        introduction = "" if self.files else INTRODUCTION
-        return HTML.errors(self.files_html(), introduction, accepted_endings(), MAX_UPLOAD_BYTES)
+        is_empty = not self.files
+        return HTML.errors(self.files_html(), is_empty, accepted_endings(), MAX_UPLOAD_BYTES)
 
     def result_html(self, result: description.Result) -> Markup:
         return details_html(block for block in result.blocks() if not isinstance(block, str))
