@@ -10,7 +10,7 @@ from warpspace.analysis.statistics import P95, share_below, share_within, volume
 from warpspace.app.browser.html import EMPTY, number
 from warpspace.app.browser.templates import Templates
 from warpspace.app.drawing.around import unmeasured_mm
-from warpspace.app.drawing.camera import CameraMemory
+from warpspace.app.drawing.camera import CameraMemory, view_axes
 from warpspace.app.drawing.labels import axis_labels, point_labels, trace_label
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.compare import table_words
@@ -324,12 +324,8 @@ def projected_labels(
     labels = [*axis_labels(picture), *point_labels(picture)]
     points = np.array([*(label.at_mm for label in labels), picture.grid.bounds_mm.mean(axis=0)])
     position = np.array(camera.position)
-    forth = np.array(camera.look_at) - position
-    forth = forth / np.linalg.norm(forth)
-    right = np.cross(forth, camera.up)
-    right = right / np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(right, forth), forth], axis=1)
-    across, up, away = ((points * SCENE_PER_MM - position) @ rotation).T
+    axes = view_axes(position - camera.look_at, camera.up)
+    across, up, away = ((points * SCENE_PER_MM - position) @ axes * (1.0, 1.0, -1.0)).T
     px = height / 2.0 / np.tan(camera.fov_rad / 2.0) / away
     spots = np.stack([width / 2.0 + across * px, height / 2.0 + up * px], axis=-1)
     inside = (away > 0.0) & (spots > 0.0).all(axis=-1) & (spots < (width, height)).all(axis=-1)

@@ -331,20 +331,14 @@ class ErrorsPanel(Panel):
             rows_html[key] = value, row_html
         return {f"error.{key}": rows_html[key][1] for key in ranking.order}
 
-    @on(do.SetError)
-    def set_error(self, state: AppState, action: do.SetError) -> AppState | None:
+    @on(do.SetError, do.EditCurve)
+    def edit(self, state: AppState, action: do.SetError | do.EditCurve) -> AppState | None:
         if action.key not in state.amplitudes:
             return None
         self._edited.add(action.key)
         self._is_edit = True
-        return put(state, f"amplitudes.{action.key}", action.value)
-
-    @on(do.EditCurve)
-    def edit_curve(self, state: AppState, action: do.EditCurve) -> AppState | None:
-        if action.key not in state.amplitudes:
-            return None
-        self._edited.add(action.key)
-        self._is_edit = True
+        if isinstance(action, do.SetError):
+            return put(state, f"amplitudes.{action.key}", action.value)
         state, feedback = edit_curve(state, action)
         self._feedback = {**self._feedback, action.key: feedback}
         self.context.call_soon(self.rerender)  # also if the edit is refused

@@ -62,13 +62,9 @@ class NotesPanel(Panel):
 
     # --- actions ---------------------------------------------------------------------------------
 
-    @on(do.Signal.OPEN_NOTES)
-    def open(self, state: AppState) -> AppState:
-        return _opened(state, LIST)
-
-    @on(do.Signal.CLOSE_NOTES)
-    def close(self, state: AppState) -> AppState:
-        return _opened(state, "")
+    @on(do.Signal.OPEN_NOTES, do.Signal.CLOSE_NOTES)
+    def open(self, state: AppState, signal: do.Signal) -> AppState:
+        return _opened(state, LIST if signal is do.Signal.OPEN_NOTES else "")
 
     @on(do.Input.PIN_NOTE)
     def pin(self, state: AppState, text: str) -> AppState:
@@ -296,6 +292,10 @@ class NoteNumbersPanel(Panel):
 # --- The story: the views of the notes, one after the other ---------------------------------------
 
 GLIDE_MS = 600  # from step to step
+MOVES = {
+    do.Signal.NEXT_STEP: 1, do.Signal.PREVIOUS_STEP: -1,
+    do.Signal.FIRST_STEP: -MAX_NOTES, do.Signal.LAST_STEP: MAX_NOTES,
+}  # fmt: skip
 
 
 class StoryPanel(Panel):
@@ -321,29 +321,14 @@ class StoryPanel(Panel):
         elif self._number is None:
             self.context.player.move(STORY, 0.0)
 
-    @on(do.Signal.NEXT_STEP, later=True)
-    def show_next(self) -> None:
-        self._move_by(1)
-
-    @on(do.Signal.PREVIOUS_STEP, later=True)
-    def show_previous(self) -> None:
-        self._move_by(-1)
-
-    @on(do.Signal.FIRST_STEP, later=True)
-    def show_first(self) -> None:
-        self._move_by(-MAX_NOTES)
-
-    @on(do.Signal.LAST_STEP, later=True)
-    def show_last(self) -> None:
-        self._move_by(MAX_NOTES)
+    @on(*MOVES, later=True)
+    def move(self, signal: do.Signal) -> None:
+        if self._number is not None:
+            self.context.player.move(STORY, float(self._number + MOVES[signal]))
 
     @on(do.Signal.END_STORY)
     def end(self, state: AppState) -> None:
         self.context.player.stop(STORY)
-
-    def _move_by(self, n_steps: int) -> None:
-        if self._number is not None:
-            self.context.player.move(STORY, float(self._number + n_steps))
 
     def _follow(self) -> None:
         context, number, before = self.context, self.context.player.step_of(STORY), self._number

@@ -1,7 +1,7 @@
 """The top bar, all commands with their keys, the tasks, and the list of all panels."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from textwrap import shorten
@@ -35,16 +35,6 @@ from warpspace.machine.limits import MAX_UPLOAD_BYTES
 
 HTML = Templates("page")
 LONGEST_SENTENCE = 130
-
-
-class StatePanel(Panel):
-    """Sets any leaf of the state."""
-
-    name = "state"
-
-    @on(do.SetLeaf)
-    def set_leaf(self, state: AppState, action: do.SetLeaf) -> AppState:
-        return put(state, action.path, action.value)
 
 
 class TopPanel(Panel):
@@ -208,7 +198,7 @@ class HelpDialog(Dialog):
 
 
 class PagePanel(Panel):
-    """Actions of the whole page: sections, dialogs, undo, redo, and all errors."""
+    """Actions of the whole page: any leaf of the state, sections, dialogs, undo, all errors."""
 
     name = "page"
     refresh = Refresh.IMMEDIATE
@@ -221,26 +211,30 @@ class PagePanel(Panel):
         # an open dialog renders its own content
         return {} if picture.state.page.window else {"window": ""}
 
-    @on(do.Signal.UNDO, later=True)
-    def undo(self) -> None:
-        self._go("undo", self.context.store.undo)
+    @on(do.SetLeaf)
+    def set_leaf(self, state: AppState, action: do.SetLeaf) -> AppState:
+        return put(state, action.path, action.value)
 
-    @on(do.Signal.REDO, later=True)
-    def redo(self) -> None:
-        self._go("redo", self.context.store.redo)
+    @on(do.Signal.UNDO, do.Signal.REDO, later=True)
+    def step(self, signal: do.Signal) -> None:
+        is_undo, store = signal is do.Signal.UNDO, self.context.store
+        try:
+            description = store.undo() if is_undo else store.redo()
+        except OptionError as error:
+            self.context.notes.append(str(error))
+            return
+        done = f"{'Undone' if is_undo else 'Redone'}: {description}"
+        self.context.notify(done if description else f"Nothing to {signal}")
 
     @on(do.Signal.FIT_VIEW, later=True)
     def fit_view(self) -> None:
         self.context.fit_view()
 
-    @on(do.Signal.SHOW_HINTS)
-    def show_hints(self, state: AppState) -> AppState:
-        self.context.call_soon(partial(self.context.page.call, "hints", True))
-        return put(state, "page.window", "")
-
-    @on(do.Signal.CLOSE_DIALOG)
-    def close_dialog(self, state: AppState) -> AppState:
-        self.context.call_soon(self.context.dialog_closed)
+    @on(do.Signal.CLOSE_DIALOG, do.Signal.SHOW_HINTS)
+    def close_dialog(self, state: AppState, signal: do.Signal) -> AppState:
+        show_hints = partial(self.context.page.call, "hints", True)
+        is_close = signal is do.Signal.CLOSE_DIALOG
+        self.context.call_soon(self.context.dialog_closed if is_close else show_hints)
         return put(state, "page.window", "")
 
     @on(do.Input.OPEN_DIALOG)
@@ -264,26 +258,11 @@ class PagePanel(Panel):
             return None
         return replace(state, shown=replace(state.shown, **{option: not is_on}))
 
-    @on(do.Signal.INCLUDE_ERRORS)
-    def include_errors(self, state: AppState) -> AppState:
-        return replace(state, exclusions=Exclusions())
-
-    @on(do.Signal.ZERO_ERRORS)
-    def zero_errors(self, state: AppState) -> AppState:
-        return state.zeroed()
-
-    @on(do.Signal.RESET_ERRORS)
-    def reset_errors(self, state: AppState) -> AppState:
-        return state.reset()
-
-    def _go(self, name: str, go: Callable[[], str]) -> None:
-        try:
-            description = go()
-        except OptionError as error:
-            self.context.notes.append(str(error))
-            return
-        done = {"undo": "Undone", "redo": "Redone"}[name]
-        self.context.notify(f"{done}: {description}" if description else f"Nothing to {name}")
+    @on(do.Signal.INCLUDE_ERRORS, do.Signal.ZERO_ERRORS, do.Signal.RESET_ERRORS)
+    def set_all_errors(self, state: AppState, signal: do.Signal) -> AppState:
+        if signal is do.Signal.INCLUDE_ERRORS:
+            return replace(state, exclusions=Exclusions())
+        return state.zeroed() if signal is do.Signal.ZERO_ERRORS else state.reset()
 
 
 # --- The tasks, and all panels --------------------------------------------------------------------
@@ -336,7 +315,7 @@ def build_panels(context: Context) -> list[Panel]:
     kinds = (
         TopPanel, overlay.HeadPanel, overlay.LegendPanel, overlay.OrderPanel,
         overlay.ControlsPanel, PlaybackPanel, overlay.ComparePanel, ErrorsPanel,
-        overlay.OverlayPanel, StatePanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
+        overlay.OverlayPanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
         machine_editor.MachinesDialog, FilesDialog, ReportDialog, StoryPanel,
     )  # fmt: skip
     panels = [kind(context) for kind in kinds]

@@ -213,15 +213,15 @@ ActionKind: TypeAlias = type[do.Action] | do.Signal | do.Input
 F = TypeVar("F", bound=Callable[..., AppState | None])
 
 
-def on(kind: ActionKind, *, later: bool = False) -> Callable[[F], F]:
-    """Mark the handler of an action: ``method(state, action)`` returns the changed state, or None.
+def on(*kinds: ActionKind, later: bool = False) -> Callable[[F], F]:
+    """Mark the handler of actions: ``method(state, action)`` returns the changed state, or None.
 
     A later one, ``method(action)``, leaves the state alone and is called after it is updated. That
-    of a `Signal` is called without the action, that of an `Input` with its text.
+    of a single `Signal` is called without the action, that of an `Input` with its text.
     """
 
     def mark(method: F) -> F:
-        vars(method).update(kind=kind, is_later=later)
+        vars(method).update(kinds=kinds, is_later=later)
         return method
 
     return mark
@@ -249,8 +249,8 @@ class Panel:
         return {}
 
     def __init_subclass__(cls) -> None:
-        own = {method.kind: (name, method.is_later) for name, method in vars(cls).items()
-               if hasattr(method, "is_later")}  # fmt: skip
+        own = {kind: (name, method.is_later) for name, method in vars(cls).items()
+               for kind in getattr(method, "kinds", ())}  # fmt: skip
         cls.handlers = {**cls.handlers, **own}
 
     def handles(self, action: do.AnyAction) -> bool:
@@ -265,7 +265,7 @@ class Panel:
         name, is_later = self.handlers[do.kind_of(action)]
         method: Any = getattr(self, name)
         value = action.value if isinstance(action, do.InputValue) else action
-        values = () if isinstance(action, do.Signal) else (value,)
+        values = () if method.kinds == (action,) else (value,)  # of a signal
         if not is_later:
             return method(state, *values) or state
         self.context.call_soon(partial(method, *values))

@@ -1,6 +1,5 @@
 """The playback bar: play, pause, scrub and speed of whatever the drawing can play."""
 
-import math
 from collections.abc import Mapping
 from functools import partial
 
@@ -22,6 +21,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import played_axis
 from warpspace.app.panels.panel import Context, Panel, Refresh, on
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.typed_numbers import read_typed
 from warpspace.machine.axes import parameter
 from warpspace.picture.formatting import spell_factor
 from warpspace.units import MINUS
@@ -119,7 +119,7 @@ class PlaybackPanel(Panel):
 
     @on(do.Scrub, later=True)
     def scrub(self, action: do.Scrub) -> None:
-        track, at = self.context.find_tracks().get(action.axis), _read_number(action.value)
+        track, at = self.context.find_tracks().get(action.axis), read_typed(action.value)
         if track is not None and at is not None:
             self.context.player.move(action.axis, track.from_slider(at))
 
@@ -154,12 +154,3 @@ def _error_words(picture: LivePicture, sample: int) -> str:
     first = int(np.argmax(np.abs(along)))
     cause = parameter([*state.amplitudes][first]).cause
     return f"{words}, {share_words(float(along[first]) / length)} because {cause}"
-
-
-def _read_number(text: str) -> float | None:
-    """Parse a number sent by the page; None where it is none."""
-    try:
-        value = float(text[:40])
-    except ValueError:
-        return None
-    return None if math.isnan(value) else value
