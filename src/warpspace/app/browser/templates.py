@@ -38,6 +38,12 @@ def _environment() -> Environment:
     return environment
 
 
+def compile_all() -> None:
+    """Compile all templates, so that the first page does not wait for it."""
+    for name in _environment().list_templates():
+        _environment().get_template(name)
+
+
 class Templates:
     """The macros of one file, as functions that return `Markup`."""
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import lru_cache
-from typing import Generic, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from markupsafe import Markup
@@ -232,18 +232,6 @@ FOLDED = "zero"  # section of the errors that are zero
 T = TypeVar("T")
 
 
-class Memo(Generic[T]):
-    """The last value computed from an input."""
-
-    def __init__(self) -> None:
-        self._memory: tuple[object, T] | None = None
-
-    def get(self, inputs: object, compute: Callable[[], T]) -> T:
-        if self._memory is None or self._memory[0] != inputs:
-            self._memory = inputs, compute()
-        return self._memory[1]
-
-
 @dataclass(frozen=True, slots=True)
 class Ranking:
     """Order, bar scale and slider ranges of the rows; they are constant during a drag."""
@@ -274,17 +262,22 @@ class ErrorsPanel(Panel):
         self._is_edit = False  # since the last rendering
         self._shown: Mapping[str, float] = {}  # amplitudes of the last rendering
         self._ranking: Ranking | None = None
-        self._gains, self._list = Memo[Mapping[str, float]](), Memo[str]()
-        self._rows = Memo[dict[str, tuple[float, str]]]()  # HTML of a value, by key
+        self._memory: dict[str, tuple[object, Any]] = {}  # values with their inputs
+
+    def _recall(self, name: str, inputs: object, compute: Callable[[], T]) -> T:
+        """Return the value computed last, unless its inputs have changed."""
+        if name not in self._memory or self._memory[name][0] != inputs:
+            self._memory[name] = inputs, compute()
+        return self._memory[name][1]
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         state = picture.state
         inputs = (Identity(state.scene), state.view_key, tuple(state.positions.items()))
-        gains = self._gains.get(inputs, lambda: _gains(picture))
+        gains = self._recall("gains", inputs, lambda: _gains(picture))
         ranking = self._rank(state, gains)
         listed = (ranking.order, ranking.used, bool(state.changed_keys))
         inputs = (*listed, state.page, state.exclusions, picture.other_title)
-        errors = self._list.get(inputs, lambda: _list_html(picture, ranking))
+        errors = self._recall("list", inputs, lambda: _list_html(picture, ranking))
         return {"errors": errors, **self._render_rows(state, ranking, gains)}
 
     def _rank(self, state: AppState, gains: Mapping[str, float]) -> Ranking:
@@ -315,7 +308,7 @@ class ErrorsPanel(Panel):
     ) -> dict[str, str]:
         inputs = (Identity(state.scene), Identity(ranking), Identity(gains), state.exclusions,
                   state.page.row, Identity(self._feedback))  # fmt: skip
-        rows_html = self._rows.get(inputs, dict[str, tuple[float, str]])
+        rows_html = self._recall("rows", inputs, dict[str, tuple[float, str]])  # by key
         for key in ranking.order:
             value, span = state.amplitudes[key], ranking.spans[key]
             if key in rows_html and rows_html[key][0] == value:

@@ -56,7 +56,9 @@ class JobDialog(Dialog):
             return
 
         def work(job: Job) -> None:
-            picture = current if as_drawn else without_tables(current)
+            picture = current
+            if not as_drawn and drawn_tables(current.state):  # files do not contain tables
+                picture = PLAIN.evaluate(without_table(current.state))
             content = write(picture, job)
             if not job.is_set():
                 self.context.save_file(f"{transfers.file_stem(picture)}{ending}", content)
@@ -199,18 +201,17 @@ class FilesDialog(JobDialog):
 
         self.make("Current view", "_view.png", draw, as_drawn=True)
 
-    @on(do.Signal.SAVE_PAGE, later=True)
-    def save_page(self) -> None:
+    @on(do.Signal.SAVE_PAGE, do.Signal.SAVE_STORY, later=True)
+    def save_page(self, signal: do.Signal) -> None:
+        context = self.context
         toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
-        build = partial(build_offline_html, provenance=toml, camera=self.context.camera.remember())
-        self.make("Page", ".html", lambda picture, _: build(picture).encode(), as_drawn=True)
-
-    @on(do.Signal.SAVE_STORY, later=True)
-    def save_story(self) -> None:
-        toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
-        about = without_table(self.context.state), toml, self.context.scenes.fixed
-        self.make("Story", "_story.html", lambda *_: build_story_html(*about).encode(),
-                  as_drawn=True)  # fmt: skip
+        if signal is do.Signal.SAVE_PAGE:
+            build = partial(build_offline_html, provenance=toml, camera=context.camera.remember())
+            self.make("Page", ".html", lambda picture, _: build(picture).encode(), as_drawn=True)
+        else:
+            about = without_table(context.state), toml, context.scenes.fixed
+            self.make("Story", "_story.html", lambda *_: build_story_html(*about).encode(),
+                      as_drawn=True)  # fmt: skip
 
     @on(do.Input.EXPORT, later=True)
     def export(self, ending: str) -> None:
@@ -218,13 +219,6 @@ class FilesDialog(JobDialog):
         if ending in dict(services.exports):
             self.make(ending[1:].upper(), ending,
                       lambda picture, _: services.write_export(picture, ending))  # fmt: skip
-
-
-def without_tables(picture: LivePicture) -> LivePicture:
-    """Return a picture without compensation tables, which files do not contain."""
-    if not drawn_tables(picture.state):
-        return picture
-    return PLAIN.evaluate(without_table(picture.state))
 
 
 # --- The report -----------------------------------------------------------------------------------

@@ -25,7 +25,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import explain_point, pick, pick_worst
 from warpspace.app.panels.conventions import with_travel
 from warpspace.app.panels.design import allowed_words
-from warpspace.app.panels.panel import Context, Panel, Refresh, on, setting
+from warpspace.app.panels.panel import Context, Panel, Refresh, on, setting, with_section
 from warpspace.app.panels.playback import share_words
 from warpspace.app.state.app_state import COMPARISON_VIEWS, COMPONENT_NAMES, NOBODY, AppState, Side
 from warpspace.app.state.leaf import Identity
@@ -268,23 +268,18 @@ class ControlsPanel(Panel):
     @on(do.ShowDrawing)
     def show_drawing(self, state: AppState, action: do.ShowDrawing) -> AppState:
         state = put(state, "look.drawing", action.value)
-        if action.value == "volume":
-            return state
-        opened = state.page.open | {"rotary"}
-        return replace(state, page=replace(state.page, task="machine", open=opened))
+        return state if action.value == "volume" else with_section(state, "machine", "rotary")
 
     @on(do.Input.SET_TRAVEL)
     def set_travel(self, state: AppState, direction: str) -> AppState:
         return with_travel(state, direction)
 
-    @on(do.ViewFrom, later=True)
-    def view_from(self, action: do.ViewFrom) -> None:
-        self.context.fit_view(action.view)
-        self.rerender()
-
-    @on(do.SetOrthographic, later=True)
-    def set_orthographic(self, action: do.SetOrthographic) -> None:
-        self.context.fit_view(lens=action.value == "1")
+    @on(do.ViewFrom, do.SetOrthographic, later=True)
+    def move_camera(self, action: do.ViewFrom | do.SetOrthographic) -> None:
+        if isinstance(action, do.ViewFrom):
+            self.context.fit_view(action.view)
+        else:
+            self.context.fit_view(lens=action.value == "1")
         self.rerender()
 
 

@@ -23,7 +23,7 @@ from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog, accepte
 from warpspace.app.panels.improve import AdjustPanel, BestPanel, CompensatePanel
 from warpspace.app.panels.measurement import CalibratePanel, TestsPanel
 from warpspace.app.panels.note_panels import NoteNumbersPanel, NotesPanel, StoryPanel
-from warpspace.app.panels.panel import Context, Dialog, Panel, Refresh, Section, on
+from warpspace.app.panels.panel import Context, Dialog, Panel, Refresh, Section, on, with_section
 from warpspace.app.panels.playback import PlaybackPanel
 from warpspace.app.panels.upload_panels import ImportPanel, PartPanel, ProgramPanel
 from warpspace.app.state.app_state import AppState, Exclusions
@@ -109,9 +109,7 @@ COMMANDS = (
     Command("Play the story", do.Signal.START_STORY),
     Command("Pin a note", do.Input.PIN_NOTE(), keys=("n",)),
     Command("Notes", do.Signal.OPEN_NOTES),
-    Command(
-        "Compare two scenes", do.Signal.OPEN_COMPARISON, search_terms="difference before after"
-    ),
+    Command("Compare two scenes", do.Signal.OPEN_COMPARISON, (), "difference before after"),
     Command("Find an error", do.Signal.FIND_ERROR, keys=("/",)),
     Command("Fit the view", do.Signal.FIT_VIEW, keys=("f",)),
     Command("Component: magnitude of the error", do.SetLeaf("component", "norm"), ("1",)),
@@ -247,9 +245,8 @@ class PagePanel(Panel):
 
     @on(do.OpenSection)
     def open_section(self, state: AppState, action: do.OpenSection) -> AppState:
-        state = put(put(state, "page.task", action.task), "page.window", "")
-        opened = state.page.open | {action.section}
-        return replace(state, page=replace(state.page, open=opened))
+        state = put(state, "page.task", action.task)
+        return with_section(state, state.page.task, action.section)
 
     @on(do.Input.TOGGLE_DISPLAY)
     def toggle_display(self, state: AppState, option: str) -> AppState | None:

@@ -276,6 +276,12 @@ class Panel:
         self.context.rerender(self)
 
 
+def with_section(state: AppState, task: str, name: str) -> AppState:
+    """Open a section of a task."""
+    page = replace(state.page, task=task, open=state.page.open | {name}, window="")
+    return replace(state, page=page)
+
+
 class Section(Panel):
     """A section of a task; a folded one is neither computed nor sent."""
 

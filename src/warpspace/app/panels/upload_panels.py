@@ -25,7 +25,7 @@ from warpspace.app.panels.analysis_panel import ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.file_dialogs import accepted_endings
 from warpspace.app.panels.measurement import MOST_BYTES, FilesPanel, UploadedFile
-from warpspace.app.panels.panel import Context, on, setting
+from warpspace.app.panels.panel import Context, on, setting, with_section
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
 from warpspace.app.state.form_values import option_values, read_form
@@ -245,9 +245,8 @@ def _recognised(files: Sequence[UploadedFile]) -> registry.Format | None:
 
 def _unfolded(state: AppState, *, keeps_forms: bool) -> AppState:
     """Open the section; options for other files are reset."""
-    page = replace(state.page, task="measure", open=state.page.open | {NAME}, window="")
     forms = {k: v for k, v in state.forms.items() if keeps_forms or not k.startswith(f"{NAME}.")}
-    return replace(state, page=page, forms=forms)
+    return replace(with_section(state, "measure", NAME), forms=forms)
 
 
 # --- The workpiece and the NC program in the working volume ---------------------------------------
@@ -284,8 +283,7 @@ class SceneOverlayPanel(FilesPanel):
 
     def show(self, content: object, name: str, **changes: Any) -> None:
         def update(state: AppState) -> AppState:
-            opened = state.page.open | {self.name}
-            state = replace(state, page=replace(state.page, task=self.task, open=opened, window=""))
+            state = with_section(state, self.task, self.name)
             return self.with_content(state, content, name, shown=True, **changes)
 
         self.context.post(update)
