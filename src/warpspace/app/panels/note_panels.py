@@ -5,8 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from markupsafe import Markup
-
 from warpspace.analysis import note_tables
 from warpspace.app.browser import actions as do
 from warpspace.app.browser.html import EMPTY, text
@@ -32,6 +30,7 @@ LIST, NEW = "list", "new"
 """Values of `PageLook.notes` beside the id of an edited note."""
 MOST_AUTHOR = 100  # characters of a name, as in a file
 AMPLITUDES = "amplitudes."  # prefix of the key of an error in a path of the state
+NOTE_FACTS = note_tables.spell_place, note_tables.spell_numbers, note_tables.spell_change
 SAME = 1e-6  # µm or µrad; tolerance for values that a decision has set
 
 
@@ -50,9 +49,14 @@ class NotesPanel(Panel):
     _restored: tuple[str, str, AppState, CameraMemory] | None = None
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        state, restored = picture.state, self._restored_view(picture.state)
+        state, restored, notes = picture.state, self._restored_view(picture.state), EMPTY
+        if state.page.notes:
+            facts = [" · ".join(filter(None, (spell(note) for spell in NOTE_FACTS)))
+                     for note in state.review]  # fmt: skip
+            notes = HTML.notes(partial(setting, state), state.review, state.page.notes,
+                               story(state.review), facts, MAX_NOTE_TEXT)  # fmt: skip
         bar = EMPTY if restored is None else HTML.reopened(*restored[:2])
-        return {"notes": _list_html(state) if state.page.notes else EMPTY, "reopened": bar}
+        return {"notes": notes, "reopened": bar}
 
     def _restored_view(self, state: AppState) -> tuple[str, str, AppState, CameraMemory] | None:
         """Return the restored view; None after it has been undone."""
@@ -249,18 +253,7 @@ def _changes(before: AppState, after: AppState) -> dict[str, Pair]:
     return {key: pair for key, pair in pairs.items() if pair[0] != pair[1]}
 
 
-# --- The list -------------------------------------------------------------------------------------
-
-NOTE_FACTS = note_tables.spell_place, note_tables.spell_numbers, note_tables.spell_change
-
-
-def _list_html(state: AppState) -> Markup:
-    return HTML.notes(partial(setting, state), state.review, state.page.notes, story(state.review),
-                      _fact_words, MAX_NOTE_TEXT)  # fmt: skip
-
-
-def _fact_words(note: Note) -> str:
-    return " · ".join(filter(None, (spell(note) for spell in NOTE_FACTS)))
+# --- Remarks --------------------------------------------------------------------------------------
 
 
 class NoteNumbersPanel(Panel):

@@ -24,7 +24,7 @@ from viser import ClientHandle, ViserServer
 from warpspace.analysis.description import Result
 from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, join, tag, text_box
+from warpspace.app.browser.html import EMPTY, join, tag
 from warpspace.app.browser.incoming import Events
 from warpspace.app.browser.page import Page
 from warpspace.app.browser.templates import Templates
@@ -80,6 +80,7 @@ class Context:
         self.notes: list[str] = []  # values that updates of the state clamped
         self._merged: tuple[object, AppState] = (None, store.state)
         self._wake = threading.Event()
+        self.wake = self._wake.set
         self.actions: deque[Callable[[], None]] = deque()
 
     @property
@@ -112,9 +113,6 @@ class Context:
         picture = picture or self.picture
         steps = story(self.store.state.review)
         return {} if picture is None else find_tracks(picture, len(steps))
-
-    def wake(self) -> None:
-        self._wake.set()
 
     def receive(self, message: Events) -> None:
         actions = (*self.events, *message.events)
@@ -355,24 +353,13 @@ def details(heading: object, *parts: object, kind: str = "options", **extra: obj
 
 def setting(state: AppState, path: str, *, text: str = "", bar: bool = False) -> Markup:
     """Render the control of a leaf of the state: a switch, a list, a text box or a slider."""
-    leaf, present, name = leaves(state)[path], value(state, path), do.SetLeaf(path)
-    if leaf.kind == "switch":
-        return html.switch(name, leaf.label, on=bool(present), hint=leaf.hint)
-    label, control = leaf.label, text_box(name, spell(state, path))
-    if leaf.kind == "choice":
-        control = html.choice(name, str(present), leaf.choices)
-    elif leaf.kind == "lines":
-        control = tag("textarea", str(present), class_="ws-box", id=html.ident(name), rows=3,
-                      data_set=name, maxlength=LONGEST, placeholder=leaf.hint or None)  # fmt: skip
-    elif leaf.kind == "number":
-        text = text or ("" if present is None else f"{present:.6g}")
-        control = text_box(name, text, size="short", inputmode="decimal",
-                           placeholder=leaf.choices.get("", ""))  # fmt: skip
-        if bar and leaf.span is not None and present is not None:
-            span, label = leaf.span, path.rpartition(".")[2]
-            control = html.slider(name, present, span.low, span.high, span.step, label=leaf.label,
-                             twin=name, text=f"{text} {leaf.unit}") + control  # fmt: skip
-    return html.field(label, control, name, leaf.unit, leaf.hint)
+    leaf, present = leaves(state)[path], value(state, path)
+    if leaf.kind != "number":
+        text = spell(state, path)
+    elif not text and present is not None:
+        text = f"{present:.6g}"
+    bar = bar and leaf.span is not None and present is not None
+    return HTML.setting(leaf, do.SetLeaf(path), present, text, bar, LONGEST)
 
 
 # --- Jobs: long computations in threads of their own, with progress, cancellable ------------------

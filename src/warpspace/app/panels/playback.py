@@ -133,24 +133,17 @@ class PlaybackPanel(Panel):
 
 def _program_words(picture: LivePicture, sample: int) -> tuple[str, str, str]:
     """Format the line of the program; and its text, its error and the main cause of this."""
-    path = picture.path
+    path, state = picture.path, picture.drawn_state
     assert path is not None  # noqa: S101 - checked by `find_tracks`
     line, lines = int(path.of.line[sample]), (picture.state.part.program or "").splitlines()
     code = lines[line - 1][:MOST_LETTERS] if 0 < line <= len(lines) else ""
-    return f"line {line}", code, _error_words(picture, sample)
-
-
-def _error_words(picture: LivePicture, sample: int) -> str:
-    """Format the error of a sample and the error parameter that contributes most to it."""
-    path, state = picture.path, picture.drawn_state
-    assert path is not None  # noqa: S101 - checked by the panel
     error = path.error_um[sample]
     length = float(np.linalg.norm(error))
     words = f"{number(length)} µm"
-    if picture.is_difference or state.controller is not None or not length:
-        return words
-    amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
-    along = amplitudes * (path.response[:, 3 * sample : 3 * sample + 3] @ error) / length
-    first = int(np.argmax(np.abs(along)))
-    cause = parameter([*state.amplitudes][first]).cause
-    return f"{words}, {share_words(float(along[first]) / length)} because {cause}"
+    if length and not picture.is_difference and state.controller is None:
+        amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
+        along = amplitudes * (path.response[:, 3 * sample : 3 * sample + 3] @ error) / length
+        first = int(np.argmax(np.abs(along)))
+        cause = parameter([*state.amplitudes][first]).cause
+        words += f", {share_words(float(along[first]) / length)} because {cause}"
+    return f"line {line}", code, words
