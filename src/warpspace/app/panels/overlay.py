@@ -347,7 +347,7 @@ class ComparePanel(Panel):
         sides = ("a", chosen.a.title, titles), ("b", b, {NOBODY: NOBODY, **titles})
         label = "compare" if compared is None else COMPARISON_VIEWS[compared.view]
         views = compared and HTML.displayed_side(compared, COMPARISON_VIEWS)
-        ghost = setting(state, "comparison.ghost")
+        ghost = compared and setting(state, "comparison.ghost")
         return {"compared": views or EMPTY,
                 "compare": HTML.comparison(label, sides, ghost, compared)}  # fmt: skip
 
