@@ -229,11 +229,16 @@ class ImportPanel(FilesPanel):
         else:
             if joined and problem is not None:
                 raise problem
-        return partial(self._show, files, is_joined=is_joined)
+        return partial(self._show, files, keeps_forms=is_joined)
 
-    def _show(self, files: tuple[UploadedFile, ...], *, is_joined: bool) -> None:
+    def _show(self, files: tuple[UploadedFile, ...], *, keeps_forms: bool) -> None:
+        def update(state: AppState) -> AppState:
+            forms = {name: value for name, value in state.forms.items()
+                     if keeps_forms or not name.startswith(f"{NAME}.")}  # fmt: skip
+            return replace(with_section(state, self.task, NAME), forms=forms)
+
         self.set_files(files)
-        self.context.post(partial(_unfolded, keeps_forms=is_joined))
+        self.context.post(update)
 
 
 def _recognised(files: Sequence[UploadedFile]) -> registry.Format | None:
@@ -243,16 +248,9 @@ def _recognised(files: Sequence[UploadedFile]) -> registry.Format | None:
         return None
 
 
-def _unfolded(state: AppState, *, keeps_forms: bool) -> AppState:
-    """Open the section; options for other files are reset."""
-    forms = {k: v for k, v in state.forms.items() if keeps_forms or not k.startswith(f"{NAME}.")}
-    return replace(with_section(state, "measure", NAME), forms=forms)
-
-
 # --- The workpiece and the NC program in the working volume ---------------------------------------
 
 MOST_LETTERS = 200  # of a displayed line
-AXES: tuple[Literal["x", "y", "z"], ...] = ("x", "y", "z")  # of the workpiece
 
 
 class SceneOverlayPanel(FilesPanel):
@@ -315,7 +313,7 @@ class PartPanel(SceneOverlayPanel):
         return {"place": part.place, "mesh": part.mesh, **files}
 
     def about(self, state: AppState) -> Markup:
-        return HTML.part(AXES, partial(setting, state), MAX_SCENE_BYTES)
+        return HTML.part(partial(setting, state), MAX_SCENE_BYTES)
 
     def result_html(self, result: description.Result) -> Markup:
         *_, features = (block for block in result.blocks() if isinstance(block, Table))
