@@ -227,8 +227,8 @@ def on(*kinds: ActionKind, later: bool = False) -> Callable[[F], F]:
 
 class Panel:
     name: str = ""  # also in the `PanelAction`s for it
-    # method, and whether it is called later, by kind of action
-    handlers: ClassVar[Mapping[object, tuple[str, bool]]] = {}
+    # method, kinds of its actions, and whether it is called later, by kind of action
+    handlers: ClassVar[Mapping[object, tuple[str, tuple[object, ...], bool]]] = {}
     refresh: ClassVar[Refresh] = Refresh.DEBOUNCED
 
     def __init__(self, context: Context) -> None:
@@ -247,7 +247,7 @@ class Panel:
         return {}
 
     def __init_subclass__(cls) -> None:
-        own = {kind: (name, method.is_later) for name, method in vars(cls).items()
+        own = {kind: (name, method.kinds, method.is_later) for name, method in vars(cls).items()
                for kind in getattr(method, "kinds", ())}  # fmt: skip
         cls.handlers = {**cls.handlers, **own}
 
@@ -260,10 +260,10 @@ class Panel:
         """Handle an action; those of other panels change nothing."""
         if not self.handles(action):
             return state
-        name, is_later = self.handlers[do.kind_of(action)]
+        name, kinds, is_later = self.handlers[do.kind_of(action)]
         method: Any = getattr(self, name)
         value = action.value if isinstance(action, do.InputValue) else action
-        values = () if method.kinds == (action,) else (value,)  # of a signal
+        values = () if kinds == (action,) else (value,)  # of a signal
         if not is_later:
             return method(state, *values) or state
         self.context.call_soon(partial(method, *values))
