@@ -64,8 +64,7 @@ def test_every_key_is_there_once_and_none_without_ctrl_changes_the_model():
     keys = [key for one in page_panels.COMMANDS for key in one.keys]
     assert len(keys) == len(set(keys)) == len(page_panels.key_actions())
     for command in page_panels.COMMANDS:
-        kinds = (page_panels.StatePanel, page_panels.PagePanel)
-        windows = [Alone(kind, STATE) for kind in kinds]
+        windows = [Alone(page_panels.PagePanel, STATE)]
         windows = [window for window in windows if window.part.handles(command.action)]
         for window in windows if command.keys and "ctrl" not in command.keys[0] else ():
             window.part.context.store.apply(lambda state: state.with_amplitude("EAX", 7.0))

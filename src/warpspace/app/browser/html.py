@@ -162,30 +162,6 @@ def switch(name: AnyAction, label: object, *, on: bool, hint: str = "") -> Marku
     return tag("label", join((box, " ", label)), class_="ws-switch", title=hint or None)
 
 
-def fold(
-    key: str, heading: object, body: object, *, opens: AnyAction, open_: bool, hint: str = ""
-) -> Markup:
-    """Render a section with a heading that unfolds it; a folded one has no body."""
-    head = fill(
-        '<summary class="ws-fold" data-do="{opens}"{hint}>'
-        "<h3>{heading}</h3></summary>",
-        opens=opens, hint=attributes(title=hint or None), heading=heading,
-    )  # fmt: skip
-    inner = tag("div", body, class_="ws-body") if open_ else EMPTY
-    return tag("details", head + inner, data_key=key, class_="ws-section", open=open_)
-
-
-def menu(heading: object, body: object, *, key: str, kind: str = "", hint: str = "",
-         label: str = "") -> Markup:  # fmt: skip
-    """Render a menu that opens over the page; `kind` "up" opens it upwards."""
-    return fill(
-        '<details class="ws-pop {kind}" data-key="menu-{key}"{title}><summary{label}>{words}'
-        '</summary><div class="ws-sheet">{body}</div></details>',
-        kind=kind, key=key, title=attributes(title=hint or None), words=heading, body=body,
-        label=attributes(aria_label=label or None),
-    )  # fmt: skip
-
-
 def rows(pairs: Iterable[tuple[object, object]], kind: str = "ws-rows") -> Markup:
     body = join(fill("<tr><th>{head}</th><td>{value}</td></tr>", head=h, value=v) for h, v in pairs)
     return tag("table", body, class_=kind)

@@ -7,9 +7,10 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.statistics import P95, share_below, share_within, volume_mean
-from warpspace.app.browser.html import EMPTY, fill, join, lowered, number, tag
+from warpspace.app.browser.html import EMPTY, number
+from warpspace.app.browser.templates import Templates
 from warpspace.app.drawing.around import unmeasured_mm
-from warpspace.app.drawing.camera import CameraMemory
+from warpspace.app.drawing.camera import CameraMemory, view_axes
 from warpspace.app.drawing.labels import axis_labels, point_labels, trace_label
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.compare import table_words
@@ -25,6 +26,7 @@ from warpspace.units import Array, spell_count, spell_short
 
 # --- The colour bar -------------------------------------------------------------------------------
 
+HTML = Templates("legend")
 NOTHING_TRACED = (
     "No error moves the traced points: the dashed circles are nominal. Set an error of a rotary"
     " axis, for example a tilt, to see the actual traces."
@@ -101,37 +103,11 @@ def marked(picture: LivePicture) -> dict[str, float]:
 
 def legend_html(picture: LivePicture) -> Markup:
     scale, named, limit = picture.scale, marks(picture), picture.exceeded_um
-    names = join(
-        tag("i", mark.text, style=f"bottom:{100.0 * mark.name_at:.2f}%",
-            class_="ws-mark", data_mark=mark.name)
-        for mark in named
-    )  # fmt: skip
-    numbers = join(
-        tag("i", text, style=f"bottom:{100.0 * at:.2f}%", class_="ws-tick")
-        for text, at in ticks(scale, picture.shown_values)
-    )
-    leads = join(
-        fill('<path d="M0 {y}L3 {y}L10 {to}"/>', y=f"{100.0 - 100.0 * mark.at:.1f}",
-             to=f"{100.0 - 100.0 * mark.name_at:.1f}")
-        for mark in named if mark.name_at <= 1.0
-    )  # fmt: skip
-    hatched = EMPTY
-    if limit is not None:
-        bottom = f"bottom:{100.0 * min(limit / scale.high, 1.0):.2f}%"
-        hatched = tag("i", "", class_="ws-hatched", style=bottom, title="Above the limit")
-    keys = [*map(lowered, faded_words(picture))]
-    if unmeasured_mm(picture).size:
-        keys.append(Markup('<span class="ws-dot">●</span> never measured'))
-    return fill(
-        '<b>{label} [{unit}]</b><div class="ws-scale" role="img" aria-label="{words}">'
-        '<i class="ws-colours" style="background:linear-gradient(to top,{colours})"></i>{hatched}'
-        '<svg viewBox="0 0 10 100" preserveAspectRatio="none">{leads}</svg>{numbers}{names}</div>'
-        "{keys}",
-        keys=join(tag("p", key, class_="ws-tiny") for key in keys),
-        label=lowered(scale.label), unit=scale.unit, leads=leads, names=names, hatched=hatched,
-        words=f"Colours from {spell_short(scale.low)} to {spell_short(scale.high)} {scale.unit}: "
-        + ", ".join(mark.text for mark in named), numbers=numbers,
-        colours=_stops(scale),
+    words = f"Colours from {spell_short(scale.low)} to {spell_short(scale.high)} {scale.unit}: "
+    return HTML.legend(
+        scale, words + ", ".join(mark.text for mark in named), _stops(scale),
+        None if limit is None else 100.0 * min(limit / scale.high, 1.0), named,
+        ticks(scale, picture.shown_values), faded_words(picture), unmeasured_mm(picture).size,
     )  # fmt: skip
 
 
@@ -148,23 +124,21 @@ def _stops(scale: ColourScale) -> str:
 
 def part_html(picture: LivePicture) -> Markup:
     """Render the largest errors of part and program, with the remark on other effects."""
-    part, look, lines = picture.part, picture.state.part, list[Markup]()
-    change = "changes " if picture.is_difference else ""
-    named = (f"Part {look.name}", part), (f"Program {look.program_name}", picture.path)
-    for subject, overlay in named:
-        if overlay is not None:
-            largest = number(float(component_values(overlay.error_um, "norm").max()))
-            out = int(overlay.outside.sum())
-            beyond = f", {spell_count(out)} points beyond the travel" if out else ""
-            lines.append(join([f"{subject} {change}up to {largest} µm{beyond}"]))
-    if part is not None and look.normal:
-        scale = picture.coloured(part)[1]
-        shades = f"background:linear-gradient(to right,{_stops(scale)})"
-        low, high = map(spell_short, (scale.low, scale.high))
-        bar = tag("i", "", class_="ws-strip", style=shades)
-        lines.append(join((f"Along its normal {low} ", bar, f" {high} µm")))
-    body = Markup("<br>").join((*lines, GEOMETRY_ONLY))
-    return tag("p", body, class_="ws-part") if lines else EMPTY
+    part, path, look = picture.part, picture.path, picture.state.part
+    if part is None and path is None:
+        return EMPTY
+    change = " changes" if picture.is_difference else ""
+    named = (f"Part {look.name}{change}", part), (f"Program {look.program_name}{change}", path)
+    errors = [
+        (subject, number(float(component_values(overlay.error_um, "norm").max())),
+         overlay.outside.any() and spell_count(int(overlay.outside.sum())))
+        for subject, overlay in named if overlay is not None
+    ]  # fmt: skip
+    if part is None or not look.normal:
+        return HTML.part(errors, (), "", GEOMETRY_ONLY)
+    scale = picture.coloured(part)[1]
+    ends = spell_short(scale.low), spell_short(scale.high)
+    return HTML.part(errors, ends, _stops(scale), GEOMETRY_ONLY)
 
 
 # --- The heading ----------------------------------------------------------------------------------
@@ -350,12 +324,8 @@ def projected_labels(
     labels = [*axis_labels(picture), *point_labels(picture)]
     points = np.array([*(label.at_mm for label in labels), picture.grid.bounds_mm.mean(axis=0)])
     position = np.array(camera.position)
-    forth = np.array(camera.look_at) - position
-    forth = forth / np.linalg.norm(forth)
-    right = np.cross(forth, camera.up)
-    right = right / np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(right, forth), forth], axis=1)
-    across, up, away = ((points * SCENE_PER_MM - position) @ rotation).T
+    axes = view_axes(position - camera.look_at, camera.up)
+    across, up, away = ((points * SCENE_PER_MM - position) @ axes * (1.0, 1.0, -1.0)).T
     px = height / 2.0 / np.tan(camera.fov_rad / 2.0) / away
     spots = np.stack([width / 2.0 + across * px, height / 2.0 + up * px], axis=-1)
     inside = (away > 0.0) & (spots > 0.0).all(axis=-1) & (spots < (width, height)).all(axis=-1)

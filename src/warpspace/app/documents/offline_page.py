@@ -22,8 +22,9 @@ import viser
 from markupsafe import Markup, escape
 
 from warpspace.analysis.note_tables import note_numbers, spell_numbers, spell_place, stale_remark
-from warpspace.app.browser.html import EMPTY, join, linked, lowered, number, rows, tag
+from warpspace.app.browser.html import EMPTY
 from warpspace.app.browser.page import script_source
+from warpspace.app.browser.templates import Templates
 from warpspace.app.browser.viser_private import BARE_STYLE
 from warpspace.app.documents import legend
 from warpspace.app.documents.scene_file import KnownScenes, reopened
@@ -48,6 +49,7 @@ from warpspace.scene.model import Scene
 from warpspace.scene.notes import Note, story
 from warpspace.units import Array
 
+HTML = Templates("offline")
 About = Mapping[str, Any] | None
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:;"
@@ -117,15 +119,9 @@ def step_words(scene: Scene, notes: Sequence[Note], index: int, problem: str) ->
     heads = (note.kind.capitalize(), note.author, f"{note.date:%Y-%m-%d}", note.status)
     stays = problem and f"The drawing of the previous step is shown: {problem}"
     stale = stale_remark(note, note_numbers(scene, [note])[0])
-    return join((
-        tag("h2", f"{index + 1} of {len(notes)}"),
-        tag("p", " · ".join(filter(None, heads)), class_="ws-quiet"),
-        tag("p", linked(note.text), class_="ws-said"),
-        *(tag("p", linked(f"{reply.author}: {reply.text}")) for reply in note.replies),
-        tag("p", " · ".join(filter(None, (spell_place(note), spell_numbers(note)))),
-            class_="ws-quiet"),
-        *(tag("p", text, class_="ws-warn") for text in (stale, stays) if text),
-    ))  # fmt: skip
+    facts = " · ".join(filter(None, (spell_place(note), spell_numbers(note))))
+    heading = " · ".join(filter(None, heads))
+    return HTML.step(index + 1, len(notes), heading, note, facts, (stale, stays))
 
 
 # --- The drawing ----------------------------------------------------------------------------------
@@ -222,8 +218,8 @@ def _build_page(title: str, steps: Sequence[PageStep], shapes: Shapes, about: Ab
     if steps[0].note:
         remarks = (LEFT_OUT, "→ next step, ← previous step", *remarks)
     heading, column, below = (
-        join(tag("div", one, data_step=i, hidden=i > 0) for i, one in enumerate(said))
-        for said in zip(*(_step_pieces(step, title) for step in steps), strict=True)
+        HTML.steps(pieces)
+        for pieces in zip(*(_step_pieces(step, title) for step in steps), strict=True)
     )
     return Template(texts.joinpath("offline.html").read_text("utf-8")).substitute(
         title=escape(title),
@@ -235,7 +231,7 @@ def _build_page(title: str, steps: Sequence[PageStep], shapes: Shapes, about: Ab
         scene=scene.replace("&", "&amp;").replace('"', "&quot;"),
         buttons="" if len(steps) > 1 else "hidden",
         beside=column,
-        remarks=below + join(tag("span", remark) for remark in remarks),
+        remarks=below + HTML.texts("span", remarks),
         # no text in a script may end it
         provenance=json.dumps(about, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c"),
         steps=_packed_steps(steps),
@@ -244,34 +240,17 @@ def _build_page(title: str, steps: Sequence[PageStep], shapes: Shapes, about: Ab
 
 
 def _step_pieces(step: PageStep, title: str) -> tuple[Markup, Markup, Markup]:
-    picture, errors = step.picture, _error_rows(step.picture)
+    picture = step.picture
     within = "" if picture.is_difference else f" · {legend.within_limit_words(picture)[0]}"
     factor, *looks = legend.look_words(picture)
     largest = f"{legend.numbers_words(picture)} {legend.place_words(picture)}{within}"
     headline = " · ".join(filter(None, (largest, legend.loop_words(picture), factor)))
     subjects = [text for text in (picture.title, *legend.subject_words(picture)) if text != title]
-    statistics = picture.statistics
-    numbers = {"mean": statistics.mean_um, "RMS": statistics.rms_um, "P95": statistics.p95_um,
-               "max": statistics.max_um}  # fmt: skip
     point_texts = [label.text for label in point_labels(picture) if label.kind == "asked"]
     counted = "different in A and B" if picture.is_difference else "not zero"
-    summary = f"{len(errors)} error{'' if len(errors) == 1 else 's'} {counted}"
-    listed = join(tag("tr", join(tag("td", cell) for cell in row)) for row in errors)
-    column = (
-        step.note,
-        *(tag("p", text, class_="ws-warn") for text in picture.state.notes),
-        legend.legend_html(picture),
-        tag("b", lowered(f"{picture.length_words} over the volume")),
-        rows((name, f"{number(value)} µm") for name, value in numbers.items()),
-        tag("p", " · ".join(point_texts)),
-        tag("details", tag("summary", summary) + tag("table", listed),
-            open=len(errors) <= MAX_UNFOLDED and not step.note),
-    )  # fmt: skip
-    return (
-        join(tag("p", text) for text in (headline, *subjects)),
-        join(column),
-        join(tag("span", text) for text in looks),
-    )
+    column = HTML.column(step, picture, legend.legend_html(picture), " · ".join(point_texts),
+                         _error_rows(picture), counted, MAX_UNFOLDED)  # fmt: skip
+    return HTML.texts("p", (headline, *subjects)), column, HTML.texts("span", looks)
 
 
 def _error_rows(picture: LivePicture) -> list[tuple[str, str, str]]:

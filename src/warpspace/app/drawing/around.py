@@ -99,9 +99,7 @@ def _rotary_traces(picture: LivePicture) -> Shapes:
     dash = TRACE_DASH * picture.size_mm
     pieces = [dashes(polylines([*of.nominal_mm]), dash, dash) for of in picture.traces]
     nominal = np.concatenate([np.zeros((0, 2, 3)), *pieces])
-    shapes: Shapes = {
-        "/rotary/nominal": lines(nominal, colour(picture, "trace_nominal"), 1.5),
-    }
+    shapes: Shapes = {"/rotary/nominal": lines(nominal, colour(picture, "trace_nominal"), 1.5)}
     moved = [line for of in picture.traces if of.error_um.any() for line in of.each()]
     if moved:
         drawn = polylines([line.actual_mm for line in moved])

@@ -101,7 +101,7 @@ def fit_camera(
     margins: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
 ) -> CameraMemory:
     """Place a camera so that points fill the picture inside margins: left, right, top, bottom."""
-    flat, axes = points_mm.reshape(-1, 3) * SCENE_PER_MM, _view_axes(direction, (0.0, 0.0, 1.0))
+    flat, axes = points_mm.reshape(-1, 3) * SCENE_PER_MM, view_axes(direction, (0.0, 0.0, 1.0))
     right, up, backward = axes.T
     half = np.tan(np.deg2rad(fov_deg) / 2.0) * np.array([max(aspect, 0.1), 1.0])
     before, after = np.array([margins[0], margins[3]]), np.array([margins[1], margins[2]])
@@ -124,14 +124,14 @@ def fit_camera(
 
 def is_in_view(place: CameraMemory, points_mm: Array, aspect: float) -> bool:
     """Check if all points are in the picture of a camera."""
-    axes = _view_axes(np.subtract(place.position, place.look_at), place.up)
+    axes = view_axes(np.subtract(place.position, place.look_at), place.up)
     seen = (points_mm.reshape(-1, 3) * SCENE_PER_MM - np.array(place.position)) @ axes
     depth = -seen[:, 2]
     half = np.tan(place.fov_rad / 2.0) * np.array([aspect, 1.0]) * depth[:, None]
     return bool((depth > 0.0).all() and (np.abs(seen[:, :2]) <= half).all())
 
 
-def _view_axes(direction: ArrayLike, up: ArrayLike) -> Array:
+def view_axes(direction: ArrayLike, up: ArrayLike) -> Array:
     """Return right, up and backward of a camera as columns, [3, 3]; `direction` is backward."""
     backward, upward = np.asarray(direction, dtype=float), np.asarray(up, dtype=float)
     backward = backward / np.linalg.norm(backward)

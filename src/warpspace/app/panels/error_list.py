@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import lru_cache
-from typing import Generic, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from markupsafe import Markup
@@ -14,12 +14,13 @@ from markupsafe import Markup
 from warpspace.analysis.blocks import Band, Curve, Lines
 from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button, fill, join, tag
+from warpspace.app.browser.html import fill
+from warpspace.app.browser.templates import Templates
 from warpspace.app.evaluation.compare import plain_state, present_words, without_table
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import lines_html
 from warpspace.app.panels.file_dialogs import PLAIN
-from warpspace.app.panels.panel import Context, Panel, Refresh, actions, on, quiet, tiny
+from warpspace.app.panels.panel import Context, Panel, Refresh, on
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import amplitude_span
@@ -37,6 +38,7 @@ from warpspace.machine.limits import MAX_CURVE_ROWS, MAX_CURVE_TEXT, MAX_ERROR
 from warpspace.scene.model import grid_basis
 from warpspace.units import MINUS, Array, spell
 
+HTML = Templates("errors")
 CHART_SAMPLES = 181
 MAX_KINKS = 500  # of a curve, drawn exactly
 
@@ -101,10 +103,6 @@ def sample_curve(function: ErrorFunction, span: tuple[float, float]) -> tuple[Ar
 # --- The row of an error --------------------------------------------------------------------------
 
 MOST_READINGS = 400  # drawn, evenly spaced
-TYPING = (
-    "Separate numbers by blanks, tabs or semicolons; use a decimal point or comma. Cells of a"
-    " spreadsheet can be pasted, CSV files dropped here."
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,48 +114,22 @@ class CurveEditFeedback:
 
 def curve_html(state: AppState, key: str, feedback: CurveEditFeedback | None) -> Markup:
     row, function = parameter(key), state.curve(key)
+    chart = lines_html(_chart(state, row, function))
     only, excluded = key in state.exclusions.only, key in state.exclusions.excluded
-    origin, is_edited = origin_words(state, key)
-    reset = EMPTY
-    if is_edited:
-        reset = button("Reset to the scene", do.EditCurve(key, "own"), kind="link",
-                       hint="Restore value and curve of the scene")  # fmt: skip
-    feedback = feedback or CurveEditFeedback(spell_rows(function), "", is_problem=False)
-    return tag("div", join((
-        _chart(state, row, function),
-        html.rows([("Origin", origin + reset)], "ws-origin"),
-        _editor(row, function, feedback),
-        actions(
-            button("Only this error", do.SetLeaf("exclusions.only", f"{'-' if only else '+'}{key}"),
-                   pressed=only, hint="Evaluate the machine with the errors selected here only"),
-            button("Exclude", do.SetLeaf("exclusions.excluded", f"{'-' if excluded else '+'}{key}"),
-                   pressed=excluded, hint="Evaluate the machine without this error"),
-        ),
-    )), class_="ws-error-more", data_key=f"more-{key}")  # fmt: skip
+    editor = _editor(row, function, feedback)
+    return HTML.curve(row, chart, *origin_words(state, key), editor, only, excluded)
 
 
-def _editor(row: Parameter, function: ErrorFunction, feedback: CurveEditFeedback) -> Markup:
-    name, kind = do.EditCurve(row.key, "rows"), do.EditCurve(row.key, "kind")
+def _editor(row: Parameter, function: ErrorFunction, feedback: CurveEditFeedback | None) -> Markup:
+    titles, n_lines = [Constant.title] if row.is_constant else kind_titles(), 0
+    if not function.edited_as_rows:
+        titles, feedback = [*titles, function.title], None
+    else:
+        feedback = feedback or CurveEditFeedback(spell_rows(function), "", is_problem=False)
+        n_lines = min(max(feedback.text.count("\n") + 1, 2), 8)
+    kinds = dict(zip(titles, titles, strict=True))
     columns = function.row_words
-    titles = [Constant.title] if row.is_constant else kind_titles()
-    if not function.edited_as_rows:
-        titles.append(function.title)
-    kinds = html.choice(kind, function.title, dict(zip(titles, titles, strict=True)))
-    fields = html.field("Curve", kinds, kind)
-    if not function.edited_as_rows:
-        return fields + tiny(columns[0].upper() + columns[1:] + ".")
-    text, is_problem, message = feedback.text, feedback.is_problem, EMPTY
-    if feedback.message:
-        message = tag("p", feedback.message, class_="ws-problem" if is_problem else "ws-quiet",
-                      role="alert" if is_problem else "status")  # fmt: skip
-    return fields + fill(
-        '<textarea id="{id}" class="ws-box ws-rows-box" data-set="{name}" rows="{count}"'
-        ' spellcheck="false" aria-label="{label}" aria-invalid="{invalid}" title="{hint}">'
-        '\n{text}</textarea><p class="ws-tiny">{columns}</p>{message}',
-        id=html.ident(name), name=name, count=min(max(text.count("\n") + 1, 2), 8), text=text,
-        label=f"Numbers of {row.key}: {columns}", hint=TYPING, invalid=str(is_problem).lower(),
-        columns=f"{columns}, in {row.unit}", message=message,
-    )  # fmt: skip
+    return HTML.editor(row, function.title, kinds, columns, feedback, n_lines)
 
 
 def edit_curve(state: AppState, action: do.EditCurve) -> tuple[AppState, CurveEditFeedback | None]:
@@ -208,7 +180,7 @@ def origin_words(state: AppState, key: str) -> tuple[str, bool]:
     return (f"edited; before: {text} " if differs and curve != reference else text), differs
 
 
-def _chart(state: AppState, row: Parameter, function: ErrorFunction) -> Markup:
+def _chart(state: AppState, row: Parameter, function: ErrorFunction) -> Lines:
     unit = state.scene.machine.axes[row.axis].unit
     at, value = sample_curve(function, state.axis_span(row.key))
     curves = [Curve("", at, value)]
@@ -233,9 +205,8 @@ def _chart(state: AppState, row: Parameter, function: ErrorFunction) -> Markup:
             name = "readings backward" if is_backward else "readings"
             curves.append(Curve(name, drawn[:, 0], drawn[:, 1], 1 + is_backward, "dots"))
     title = describe_curve(f"{row.key}, {row.name}", row.unit, unit, at, value)
-    chart = Lines("lines", title, f"{row.axis} [{unit}]", f"{row.key} [{row.unit}]",
-                  tuple(curves), tuple(bands))  # fmt: skip
-    return tag("div", lines_html(chart), class_="ws-curve")
+    axes = f"{row.axis} [{unit}]", f"{row.key} [{row.unit}]"
+    return Lines("lines", title, *axes, tuple(curves), tuple(bands))
 
 
 def _finite(values: Array) -> Array:
@@ -258,25 +229,7 @@ def describe_curve(name: str, unit: str, along: str, at: Array, value: Array) ->
 
 LONGEST_QUERY = 80
 FOLDED = "zero"  # section of the errors that are zero
-ALL_ERRORS = {
-    do.Signal.RESET_ERRORS: ("Reset to the scene", "Restore values and curves of the scene"),
-    do.Signal.ZERO_ERRORS: ("Set all to zero", "Nominal machine"),
-    do.Signal.INCLUDE_ERRORS: ("Include all", "Cancel all “Only this error” and “Exclude”"),
-}
-"""Signals for all errors, with label and hint."""
 T = TypeVar("T")
-
-
-class Memo(Generic[T]):
-    """The last value computed from an input."""
-
-    def __init__(self) -> None:
-        self._memory: tuple[object, T] | None = None
-
-    def get(self, inputs: object, compute: Callable[[], T]) -> T:
-        if self._memory is None or self._memory[0] != inputs:
-            self._memory = inputs, compute()
-        return self._memory[1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,17 +262,22 @@ class ErrorsPanel(Panel):
         self._is_edit = False  # since the last rendering
         self._shown: Mapping[str, float] = {}  # amplitudes of the last rendering
         self._ranking: Ranking | None = None
-        self._gains, self._list = Memo[Mapping[str, float]](), Memo[str]()
-        self._rows = Memo[dict[str, tuple[float, str]]]()  # HTML of a value, by key
+        self._memory: dict[str, tuple[object, Any]] = {}  # values with their inputs
+
+    def _recall(self, name: str, inputs: object, compute: Callable[[], T]) -> T:
+        """Return the value computed last, unless its inputs have changed."""
+        if name not in self._memory or self._memory[name][0] != inputs:
+            self._memory[name] = inputs, compute()
+        return self._memory[name][1]
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         state = picture.state
         inputs = (Identity(state.scene), state.view_key, tuple(state.positions.items()))
-        gains = self._gains.get(inputs, lambda: _gains(picture))
+        gains = self._recall("gains", inputs, lambda: _gains(picture))
         ranking = self._rank(state, gains)
         listed = (ranking.order, ranking.used, bool(state.changed_keys))
         inputs = (*listed, state.page, state.exclusions, picture.other_title)
-        errors = self._list.get(inputs, lambda: _list_html(picture, ranking))
+        errors = self._recall("list", inputs, lambda: _list_html(picture, ranking))
         return {"errors": errors, **self._render_rows(state, ranking, gains)}
 
     def _rank(self, state: AppState, gains: Mapping[str, float]) -> Ranking:
@@ -350,7 +308,7 @@ class ErrorsPanel(Panel):
     ) -> dict[str, str]:
         inputs = (Identity(state.scene), Identity(ranking), Identity(gains), state.exclusions,
                   state.page.row, Identity(self._feedback))  # fmt: skip
-        rows_html = self._rows.get(inputs, dict[str, tuple[float, str]])
+        rows_html = self._recall("rows", inputs, dict[str, tuple[float, str]])  # by key
         for key in ranking.order:
             value, span = state.amplitudes[key], ranking.spans[key]
             if key in rows_html and rows_html[key][0] == value:
@@ -366,20 +324,14 @@ class ErrorsPanel(Panel):
             rows_html[key] = value, row_html
         return {f"error.{key}": rows_html[key][1] for key in ranking.order}
 
-    @on(do.SetError)
-    def set_error(self, state: AppState, action: do.SetError) -> AppState | None:
+    @on(do.SetError, do.EditCurve)
+    def edit(self, state: AppState, action: do.SetError | do.EditCurve) -> AppState | None:
         if action.key not in state.amplitudes:
             return None
         self._edited.add(action.key)
         self._is_edit = True
-        return put(state, f"amplitudes.{action.key}", action.value)
-
-    @on(do.EditCurve)
-    def edit_curve(self, state: AppState, action: do.EditCurve) -> AppState | None:
-        if action.key not in state.amplitudes:
-            return None
-        self._edited.add(action.key)
-        self._is_edit = True
+        if isinstance(action, do.SetError):
+            return put(state, f"amplitudes.{action.key}", action.value)
         state, feedback = edit_curve(state, action)
         self._feedback = {**self._feedback, action.key: feedback}
         self.context.call_soon(self.rerender)  # also if the edit is refused
@@ -402,54 +354,18 @@ class ErrorsPanel(Panel):
 
 
 def _list_html(picture: LivePicture, ranking: Ranking) -> str:
-    state, used = picture.state, ranking.used
-    query = state.page.query
-    matches = find_parameters(query, ranking.order) if query.strip() else used
+    state, page, used = picture.state, picture.state.page, ranking.used
+    query = page.query.strip()
+    matches = find_parameters(query, ranking.order) if query else used
     listed = [key for key in ranking.order if key in matches]
-    zero = [] if query.strip() else [key for key in ranking.order if key not in matches]
-    is_open = FOLDED in state.page.open or not listed
-    places = _places(listed, state.page.row)
-    if query.strip() and not listed:
-        places = quiet("No matching errors.")
-    elif zero:
-        title = tag("div", f"{len(zero)} errors are zero",
-                    data_do=do.Input.FOLD_SECTION(FOLDED), id="ws-error-zero")  # fmt: skip
-        places += tag(
-            "div", title, class_="ws-zero", role="treeitem", aria_labelledby="ws-error-zero",
-            tabindex=-1 if listed else 0, aria_expanded=str(is_open).lower(),
-        )  # fmt: skip
-        places += _places(zero, state.page.row) if is_open else EMPTY
-    if listed or zero:  # keyboard: arrows move along the list, Enter opens a row
-        places = tag("div", places, role="tree", aria_label="Errors by effect")
-    excluded: tuple[object, ...] = ()
+    zero = [key for key in ranking.order if not query and key not in matches]
+    is_open, excluded = FOLDED in page.open, None
     if state.exclusions:
-        count = sum(not state.exclusions.active(key) for key in used)
-        excluded = (f"{count} of {len(used)} errors excluded. ",
-                    button("Include all", do.Signal.INCLUDE_ERRORS, kind="link"))  # fmt: skip
-    find = html.text_box(
-        do.Input.FIND_ERRORS(), query, placeholder="Find an error  /", live=True,
-        label="Find an error", id="ws-find",
-    )  # fmt: skip
-    menu = EMPTY
-    if state.exclusions or state.changed_keys or FOLDED in state.page.open:
-        buttons = join(button(label, signal, kind="quiet", hint=hint)
-                       for signal, (label, hint) in ALL_ERRORS.items())  # fmt: skip
-        summary = tag("summary", "⋯", aria_label="All errors", title="All errors")
-        menu = tag("details", summary + tag("div", buttons), class_="ws-menu")
-    head = tag("div", find + menu, class_="ws-find")
-    body = tag("div", places, class_="ws-errors", data_leave=do.Signal.SORT_ERRORS)
-    remark = tiny(present_words(picture)) if picture.other_title else EMPTY
-    return head + remark + quiet(join(excluded)) + body
-
-
-def _places(keys: list[str], row: str) -> Markup:
-    start = row if row in keys else next(iter(keys), "")
-    return join(
-        tag("div", "", data_piece=f"error.{key}", class_="ws-error", role="treeitem",
-            aria_expanded=str(key == row).lower(), aria_labelledby=f"ws-error-{key}",
-            tabindex=0 if key == start else -1)
-        for key in keys
-    )  # fmt: skip
+        excluded = sum(not state.exclusions.active(key) for key in used)
+    has_menu = bool(state.exclusions or state.changed_keys or is_open)
+    remark = present_words(picture) if picture.other_title else ""
+    return HTML.list(page.query, listed, zero, is_open or not listed, page.row, excluded, len(used),
+                     remark, has_menu)  # fmt: skip
 
 
 def _row(

@@ -11,18 +11,19 @@ from markupsafe import Markup
 
 from warpspace.analysis.description import Result
 from warpspace.app.browser import actions as do
-from warpspace.app.browser.html import button, choice, field, join, tag, text_box
+from warpspace.app.browser.templates import Templates
 from warpspace.app.documents import scene_file, transfers
 from warpspace.app.documents.offline_page import build_offline_html, build_story_html
 from warpspace.app.evaluation.compare import drawn_tables, without_table
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.panel import Context, Dialog, Job, Jobs, actions, on, quiet, setting
+from warpspace.app.panels.panel import Context, Dialog, Job, Jobs, on, setting
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
 from warpspace.scene.notes import story
 
+HTML = Templates("dialogs")
 RENDER_TIMEOUT_S = 30.0
 VIEW_PX = 64, 4096
 CHANGED = (
@@ -55,7 +56,9 @@ class JobDialog(Dialog):
             return
 
         def work(job: Job) -> None:
-            picture = current if as_drawn else without_tables(current)
+            picture = current
+            if not as_drawn and drawn_tables(current.state):  # files do not contain tables
+                picture = PLAIN.evaluate(without_table(current.state))
             content = write(picture, job)
             if not job.is_set():
                 self.context.save_file(f"{transfers.file_stem(picture)}{ending}", content)
@@ -78,35 +81,11 @@ class FilesDialog(JobDialog):
 
     def body(self, picture: LivePicture) -> Markup:
         services = self.context.services
-        figures = {"": "map as displayed"}
-        figures |= {name: name.replace("-", " ") for name, _ in services.figures}
-        kinds = choice(do.SetLeaf("page.figure"), picture.state.page.figure, figures)
-        exports = (button(end[1:].upper(), do.Input.EXPORT(end), hint=hint)
-                   for end, hint in services.exports)  # fmt: skip
-        link = (
-            tag("h3", "Link"),
-            tag("p", "This server requires a token. A link without the token works only for people"
-                " who have it; a link with the token gives everyone who has the link access."),
-            actions(button("Copy link", do.Share("without_token")),
-                    button("Copy link with token", do.Share("with_token"))),
+        names = {name: name.replace("-", " ") for name, _ in services.figures}
+        return HTML.files(
+            picture.state, transfers.exported_words(picture), {"": "map as displayed", **names},
+            services.exports, services.token, story(picture.state.review), self._jobs.html(),
         )  # fmt: skip
-        return join((
-            tag("h3", "Scene"),
-            tag("p", "Current errors, tolerances and machine, with display settings and camera."),
-            actions(button("Save scene (TOML)", do.Signal.SAVE_SCENE, kind="main", hint="Ctrl+S")),
-            *(link if services.token else ()),
-            tag("h3", "Picture"), quiet(transfers.exported_words(picture)),
-            actions(button("Save current view (PNG)", do.Signal.SAVE_VIEW)),
-            field("Figure", kinds, do.SetLeaf("page.figure")),
-            actions(button("Save figure (PNG)", do.Signal.SAVE_FIGURE)),
-            tag("h3", "Export"),
-            actions(button("Interactive page (HTML)", do.Signal.SAVE_PAGE,
-                           hint="A single file that works offline"),
-                    *((button("Story (HTML)", do.Signal.SAVE_STORY,
-                              hint="Its steps in a single file"),)
-                      if story(picture.state.review) else ()), *exports),
-            self._jobs.html(),
-        ))  # fmt: skip
 
     @on(do.Share)
     def share(self, state: AppState, action: do.Share) -> AppState | None:
@@ -222,18 +201,17 @@ class FilesDialog(JobDialog):
 
         self.make("Current view", "_view.png", draw, as_drawn=True)
 
-    @on(do.Signal.SAVE_PAGE, later=True)
-    def save_page(self) -> None:
+    @on(do.Signal.SAVE_PAGE, do.Signal.SAVE_STORY, later=True)
+    def save_page(self, signal: do.Signal) -> None:
+        context = self.context
         toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
-        build = partial(build_offline_html, provenance=toml, camera=self.context.camera.remember())
-        self.make("Page", ".html", lambda picture, _: build(picture).encode(), as_drawn=True)
-
-    @on(do.Signal.SAVE_STORY, later=True)
-    def save_story(self) -> None:
-        toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
-        about = without_table(self.context.state), toml, self.context.scenes.fixed
-        self.make("Story", "_story.html", lambda *_: build_story_html(*about).encode(),
-                  as_drawn=True)  # fmt: skip
+        if signal is do.Signal.SAVE_PAGE:
+            build = partial(build_offline_html, provenance=toml, camera=context.camera.remember())
+            self.make("Page", ".html", lambda picture, _: build(picture).encode(), as_drawn=True)
+        else:
+            about = without_table(context.state), toml, context.scenes.fixed
+            self.make("Story", "_story.html", lambda *_: build_story_html(*about).encode(),
+                      as_drawn=True)  # fmt: skip
 
     @on(do.Input.EXPORT, later=True)
     def export(self, ending: str) -> None:
@@ -243,23 +221,7 @@ class FilesDialog(JobDialog):
                       lambda picture, _: services.write_export(picture, ending))  # fmt: skip
 
 
-def without_tables(picture: LivePicture) -> LivePicture:
-    """Return a picture without compensation tables, which files do not contain."""
-    if not drawn_tables(picture.state):
-        return picture
-    return PLAIN.evaluate(without_table(picture.state))
-
-
 # --- The report -----------------------------------------------------------------------------------
-
-ALWAYS = (
-    "verdict for the limit, and error map",
-    "statistics, sections and slices of the volume",
-    "contribution of each error at the worst point",
-    "most effective adjustments",
-    "errors, tolerances, and errors permitted by the tolerances",
-    "error gains, conventions, provenance",
-)
 
 
 def limit_words(state: AppState) -> str:
@@ -276,27 +238,9 @@ class ReportDialog(JobDialog):
         if compared is not None and transfers.has_sheet(picture):
             a, b = compared.titles
             subject = f"Comparison of A, {a}, with B, {b}."
-        added = [
-            tag(
-                "li", join((f"{title} ", button("Remove", do.RemoveFromReport(index), kind="link")))
-            )
-            for index, (title, _) in enumerate(self.context.report_results)
-        ]
-        # the list of notes may hold a box for the same name
-        name = picture.state.page.author
-        author = text_box(do.SetLeaf("page.author"), name, id="ws-report-author")
-        return join((
-            tag("p", f"{subject} {limit_words(picture.state)}."),
-            field("Author", author, "report.author"),
-            setting(picture.state, "page.questions"),
-            actions(button("Write HTML", do.WriteReport(".html"), kind="main",
-                           hint="A single page with a 3-D view; works offline"),
-                    button("Write PDF", do.WriteReport(".pdf"), hint="For printing")),
-            self._jobs.html(),
-            tag("h3", "Contents"),
-            tag("ul", join((*(tag("li", chapter) for chapter in ALWAYS), *added))),
-            quiet("To add more results, use “Add to report” below a result."),
-        ))  # fmt: skip
+        questions = setting(picture.state, "page.questions")
+        return HTML.report(f"{subject} {limit_words(picture.state)}.", picture.state.page.author,
+                           questions, self.context.report_results, self._jobs.html())  # fmt: skip
 
     @on(do.RemoveFromReport, later=True)
     def remove(self, action: do.RemoveFromReport) -> None:

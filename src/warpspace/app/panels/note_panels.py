@@ -5,18 +5,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from markupsafe import Markup
-
 from warpspace.analysis import note_tables
 from warpspace.app.browser import actions as do
-from warpspace.app.browser.html import EMPTY, button, fill, join, linked, tag, text_box
+from warpspace.app.browser.html import EMPTY, text
+from warpspace.app.browser.templates import Templates
 from warpspace.app.documents.offline_page import step_words
 from warpspace.app.documents.scene_file import reopened, view_of
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.drawing.player import STORY
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import explain_point, pick_worst, with_picked
-from warpspace.app.panels.panel import Context, Panel, Refresh, actions, on, quiet, setting, tiny
+from warpspace.app.panels.panel import Context, Panel, Refresh, on, setting
 from warpspace.app.state.app_state import AppState, Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.tree import leaves, set_leaf, stored
@@ -26,10 +25,12 @@ from warpspace.scene.notes import TOLERANCES, Note, NoteAnchor, Pair, Reply, sto
 from warpspace.scene.text_files import one_line
 from warpspace.units import spell_short
 
+HTML = Templates("notes")
 LIST, NEW = "list", "new"
 """Values of `PageLook.notes` beside the id of an edited note."""
 MOST_AUTHOR = 100  # characters of a name, as in a file
 AMPLITUDES = "amplitudes."  # prefix of the key of an error in a path of the state
+NOTE_FACTS = note_tables.spell_place, note_tables.spell_numbers, note_tables.spell_change
 SAME = 1e-6  # µm or µrad; tolerance for values that a decision has set
 
 
@@ -48,15 +49,14 @@ class NotesPanel(Panel):
     _restored: tuple[str, str, AppState, CameraMemory] | None = None
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        state, bar = picture.state, EMPTY
-        restored = self._restored_view(state)
-        if restored is not None:
-            title, note_id, *_ = restored
-            hint = "Return to the previous view"
-            leave = button("Back", do.Signal.LEAVE_NOTE_VIEW, kind="chip", hint=hint)
-            changed = tag("span", "", class_="ws-changed", data_piece=f"note.{note_id}.bar")
-            bar = tag("p", join((title, leave, changed)), role="status", class_="ws-reopened")
-        return {"notes": _list_html(state) if state.page.notes else EMPTY, "reopened": bar}
+        state, restored, notes = picture.state, self._restored_view(picture.state), EMPTY
+        if state.page.notes:
+            facts = [" · ".join(filter(None, (spell(note) for spell in NOTE_FACTS)))
+                     for note in state.review]  # fmt: skip
+            notes = HTML.notes(partial(setting, state), state.review, state.page.notes,
+                               story(state.review), facts, MAX_NOTE_TEXT)  # fmt: skip
+        bar = EMPTY if restored is None else HTML.reopened(*restored[:2])
+        return {"notes": notes, "reopened": bar}
 
     def _restored_view(self, state: AppState) -> tuple[str, str, AppState, CameraMemory] | None:
         """Return the restored view; None after it has been undone."""
@@ -66,13 +66,9 @@ class NotesPanel(Panel):
 
     # --- actions ---------------------------------------------------------------------------------
 
-    @on(do.Signal.OPEN_NOTES)
-    def open(self, state: AppState) -> AppState:
-        return _opened(state, LIST)
-
-    @on(do.Signal.CLOSE_NOTES)
-    def close(self, state: AppState) -> AppState:
-        return _opened(state, "")
+    @on(do.Signal.OPEN_NOTES, do.Signal.CLOSE_NOTES)
+    def open(self, state: AppState, signal: do.Signal) -> AppState:
+        return _opened(state, LIST if signal is do.Signal.OPEN_NOTES else "")
 
     @on(do.Input.PIN_NOTE)
     def pin(self, state: AppState, text: str) -> AppState:
@@ -257,86 +253,7 @@ def _changes(before: AppState, after: AppState) -> dict[str, Pair]:
     return {key: pair for key, pair in pairs.items() if pair[0] != pair[1]}
 
 
-# --- The list -------------------------------------------------------------------------------------
-
-NOTE_FACTS = note_tables.spell_place, note_tables.spell_numbers, note_tables.spell_change
-
-
-def _list_html(state: AppState) -> Markup:
-    close = button("✕", do.Signal.CLOSE_NOTES, kind="quiet", hint="Close (Esc)",
-                   aria_label="Close the notes",
-                   data_go=f"[data-do={do.Signal.OPEN_NOTES}]")  # fmt: skip
-    pin = button("Pin a note", do.Input.PIN_NOTE(), kind="main", hint="Pin a note (N)")
-    edited, steps = state.page.notes, story(state.review)
-    return join((
-        tag("header", join((tag("h2", "Notes"), pin, close))),
-        setting(state, "page.author"),
-        button("Play the story", do.Signal.START_STORY) if steps else EMPTY,
-        _form(state, "") if edited == NEW else EMPTY,
-        *(_form(state, edited) if note.id == edited else _note_html(number, note, steps)
-          for number, note in enumerate(state.review, 1)),
-        EMPTY if state.review else quiet("No notes yet."),
-    ))  # fmt: skip
-
-
-def _form(state: AppState, edited: str) -> Markup:
-    names = ("kind", "text") if edited else ("kind", "place", "text")
-    return tag("div", join((
-        *(setting(state, f"page.note_{name}") for name in names),
-        actions(button("Save note", do.Input.SAVE_NOTE(edited), kind="main"),
-                button("Cancel", do.Signal.OPEN_NOTES, kind="quiet")),
-    )), class_="ws-card", data_key=f"note-{edited or NEW}")  # fmt: skip
-
-
-def _message_html(message: Note | Reply) -> Markup:
-    lines = (tag("p", linked(line)) for line in message.text.splitlines() if line.strip())
-    by = f"{message.author or 'anonymous'}, {message.date:%d %b %Y}"
-    return join((*lines, tag("small", by, class_="ws-quiet")))
-
-
-def _note_html(number: int, note: Note, steps: Sequence[Note]) -> Markup:
-    facts, texts = [spell(note) for spell in NOTE_FACTS], [_message_html(note)]
-    if note.versions:
-        texts = [tag("p", "Conflicting edits: select one version.", class_="ws-stale")]
-        for index, version in enumerate((note, *note.versions)):
-            select = button("Use this version", do.ChooseVersion(note.id, index))
-            texts.append(_message_html(version) + actions(select))
-    reply = do.ReplyToNote(note.id)
-    place = f" · step {steps.index(note) + 1}" if note.step else ""
-    return tag("article", join((
-        tag("h3", f"{number} · {note.kind}{place}"), *texts,
-        tiny(" · ".join(filter(None, facts))),
-        tag("p", "", class_="ws-changed", data_piece=f"note.{note.id}"),
-        *(tag("blockquote", _message_html(answer)) for answer in note.replies),
-        text_box(reply, "", label=f"Reply to note {number}", placeholder="Reply",
-                 data_enter=reply, maxlength=MAX_NOTE_TEXT),
-        _buttons(note, steps),
-    )), class_=f"ws-note {note.status}", data_key=f"note-{note.id}", id=f"note-{note.id}",
-        tabindex=-1)  # fmt: skip
-
-
-def _buttons(note: Note, steps: Sequence[Note]) -> Markup:
-    """Render the buttons of a note; a note with conflicting versions cannot be edited."""
-    is_done, free = note.status == "done", not note.versions
-    place, change = steps.index(note) if note.step else 0, free and note.change
-    edit = partial(do.EditNote, note.id)
-    rows = (
-        ("Done", edit("status"), "Mark as open" if is_done else "Mark as done", free),
-        ("Show", do.Input.SHOW_NOTE(note.id), "Restore view, errors and camera of the note", True),
-        ("Edit", edit("edit"), "", free),
-        ("Delete", edit("delete"), "", True),
-        ("Revert", edit("revert"), "Restore the values before this decision", change),
-        ("Add to story", edit("add"), "", free and not note.step),
-        ("↑", edit("up"), "Earlier in the story", free and place > 0),
-        ("↓", edit("down"), "Later in the story", free and note.step and note != steps[-1]),
-        ("Remove from story", edit("out"), "", free and note.step),
-    )
-    return actions(*(
-        button(label, action, hint=hint, kind="" if label == "Done" else "link",
-               pressed=is_done if label == "Done" else None,
-               aria_label=hint if label in "↑↓" else None)
-        for label, action, hint, is_enabled in rows if is_enabled
-    ))  # fmt: skip
+# --- Remarks --------------------------------------------------------------------------------------
 
 
 class NoteNumbersPanel(Panel):
@@ -359,7 +276,7 @@ class NoteNumbersPanel(Panel):
         stale = [str(number) for number, remark in enumerate(remarks, 1) if remark]
         self.context.page.call("overlay.show", {"stale": stale})
         return {
-            f"note.{note.id}{place}": fill("{}", remark)
+            f"note.{note.id}{place}": text(remark)
             for note, remark in zip(review, remarks, strict=True)
             for place in ("", ".bar")
         }
@@ -368,6 +285,10 @@ class NoteNumbersPanel(Panel):
 # --- The story: the views of the notes, one after the other ---------------------------------------
 
 GLIDE_MS = 600  # from step to step
+MOVES = {
+    do.Signal.NEXT_STEP: 1, do.Signal.PREVIOUS_STEP: -1,
+    do.Signal.FIRST_STEP: -MAX_NOTES, do.Signal.LAST_STEP: MAX_NOTES,
+}  # fmt: skip
 
 
 class StoryPanel(Panel):
@@ -393,29 +314,14 @@ class StoryPanel(Panel):
         elif self._number is None:
             self.context.player.move(STORY, 0.0)
 
-    @on(do.Signal.NEXT_STEP, later=True)
-    def show_next(self) -> None:
-        self._move_by(1)
-
-    @on(do.Signal.PREVIOUS_STEP, later=True)
-    def show_previous(self) -> None:
-        self._move_by(-1)
-
-    @on(do.Signal.FIRST_STEP, later=True)
-    def show_first(self) -> None:
-        self._move_by(-MAX_NOTES)
-
-    @on(do.Signal.LAST_STEP, later=True)
-    def show_last(self) -> None:
-        self._move_by(MAX_NOTES)
+    @on(*MOVES, later=True)
+    def move(self, signal: do.Signal) -> None:
+        if self._number is not None:
+            self.context.player.move(STORY, float(self._number + MOVES[signal]))
 
     @on(do.Signal.END_STORY)
     def end(self, state: AppState) -> None:
         self.context.player.stop(STORY)
-
-    def _move_by(self, n_steps: int) -> None:
-        if self._number is not None:
-            self.context.player.move(STORY, float(self._number + n_steps))
 
     def _follow(self) -> None:
         context, number, before = self.context, self.context.player.step_of(STORY), self._number

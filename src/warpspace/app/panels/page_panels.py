@@ -1,7 +1,7 @@
 """The top bar, all commands with their keys, the tasks, and the list of all panels."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from textwrap import shorten
@@ -10,8 +10,7 @@ from markupsafe import Markup
 
 from warpspace.analysis.registry import entries
 from warpspace.app.browser import actions as do
-from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button, join, rows, tag, text_box, upload_button
+from warpspace.app.browser.templates import Templates
 from warpspace.app.drawing.player import EXAGGERATION
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import machine_editor, overlay
@@ -24,7 +23,7 @@ from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog, accepte
 from warpspace.app.panels.improve import AdjustPanel, BestPanel, CompensatePanel
 from warpspace.app.panels.measurement import CalibratePanel, TestsPanel
 from warpspace.app.panels.note_panels import NoteNumbersPanel, NotesPanel, StoryPanel
-from warpspace.app.panels.panel import Context, Dialog, Panel, Refresh, Section, details, on, quiet
+from warpspace.app.panels.panel import Context, Dialog, Panel, Refresh, Section, on, with_section
 from warpspace.app.panels.playback import PlaybackPanel
 from warpspace.app.panels.upload_panels import ImportPanel, PartPanel, ProgramPanel
 from warpspace.app.state.app_state import AppState, Exclusions
@@ -34,17 +33,8 @@ from warpspace.bench.base import bench_names, find_test
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_UPLOAD_BYTES
 
+HTML = Templates("page")
 LONGEST_SENTENCE = 130
-
-
-class StatePanel(Panel):
-    """Sets any leaf of the state."""
-
-    name = "state"
-
-    @on(do.SetLeaf)
-    def set_leaf(self, state: AppState, action: do.SetLeaf) -> AppState:
-        return put(state, action.path, action.value)
 
 
 class TopPanel(Panel):
@@ -53,38 +43,14 @@ class TopPanel(Panel):
     name = "top"
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        store = self.context.store
+        store, state = self.context.store, picture.state
         steps = (("Undo", "↶", store.undoes, "Ctrl+Z"), ("Redo", "↷", store.redoes, "Ctrl+Shift+Z"))
-        history = (
-            button(sign, do.Signal(label.lower()), kind="quiet", aria_label=label, data_key=label,
-                   hint=f"{label}: {description} ({keys})")
-            for label, sign, description, keys in steps if description
-        )  # fmt: skip
-        hint = "Open a scene, measured errors, or a compensation table (Ctrl+O)"
-        state, title = picture.state, picture.state.scene.title or picture.state.scene.name
         count = sum(note.status == "open" for note in state.review)
-        notes = [
-            button(f"Notes ({count})" if count else "Notes", do.Signal.OPEN_NOTES, kind="quiet",
-                   data_key="notes", hint="Review notes; press N to pin one")
-        ] if state.review or state.page.notes else []  # fmt: skip
-        return {
-            "top": join((
-                tag("strong", "warpspace", class_="ws-brand"),
-                button(title, do.Input.OPEN_DIALOG("scenes"), kind="ws-scene",
-                       hint="Select another scene"),
-                upload_button("Open", "files", MAX_UPLOAD_BYTES, accepted_endings(), kind="quiet",
-                              hint=hint),
-                button("Save", do.Input.OPEN_DIALOG("files"), kind="quiet",
-                       hint="Save scene, figures and exports"),
-                button("Share", do.Share(), kind="quiet", hint="Copy a link to this view"),
-                button("Report", do.Input.OPEN_DIALOG("report"), kind="quiet"),
-                *notes,
-                tag("span", "", class_="ws-fill"),
-                *history,
-                button("?", do.Input.OPEN_DIALOG("help"), kind="quiet", aria_label="Help",
-                       hint="Help (H)"),
-            ))
-        }  # fmt: skip
+        notes = f"Notes ({count})" if count else "Notes"
+        return {"top": HTML.top(
+            state.scene.title or state.scene.name, accepted_endings(), MAX_UPLOAD_BYTES,
+            notes if state.review or state.page.notes else "", steps,
+        )}  # fmt: skip
 
 
 class ScenesDialog(Dialog):
@@ -94,19 +60,12 @@ class ScenesDialog(Dialog):
 
     def body(self, picture: LivePicture) -> Markup:
         bundled = {id(scene): scene.name for scene in self.context.scenes.fixed}
-        scenes = (
-            tag("button", html.thumbnail(bundled.get(id(scene), "")) + tag("span", join((
-                tag("b", title),
-                tag("small", scene.machine.title) if scene.machine.title != title else EMPTY,
-                tag("small", shorten(re.split(r"\.\s", scene.description)[0].rstrip(" .\n"),
-                                     LONGEST_SENTENCE, placeholder=" …"))
-                if scene.description else EMPTY,
-            ))), type="button", data_do=do.Input.CHOOSE_SCENE(title),
-                aria_current="true" if scene is picture.state.origin else None)
+        return HTML.scenes(
+            (title, bundled.get(id(scene), ""), scene.machine.title,
+             shorten(re.split(r"\.\s", scene.description)[0].rstrip(" .\n"), LONGEST_SENTENCE,
+                     placeholder=" …"), scene is picture.state.origin)
             for title, scene in self.context.scenes.items()
         )  # fmt: skip
-        hint = quiet("To open a file, use Open in the top bar, or drop it on the page.")
-        return tag("div", join(scenes), class_="ws-list ws-scenes", data_list=True) + hint
 
     @on(do.Input.CHOOSE_SCENE)
     def choose(self, state: AppState, title: str) -> AppState | None:
@@ -150,9 +109,7 @@ COMMANDS = (
     Command("Play the story", do.Signal.START_STORY),
     Command("Pin a note", do.Input.PIN_NOTE(), keys=("n",)),
     Command("Notes", do.Signal.OPEN_NOTES),
-    Command(
-        "Compare two scenes", do.Signal.OPEN_COMPARISON, search_terms="difference before after"
-    ),
+    Command("Compare two scenes", do.Signal.OPEN_COMPARISON, (), "difference before after"),
     Command("Find an error", do.Signal.FIND_ERROR, keys=("/",)),
     Command("Fit the view", do.Signal.FIT_VIEW, keys=("f",)),
     Command("Component: magnitude of the error", do.SetLeaf("component", "norm"), ("1",)),
@@ -183,23 +140,6 @@ def key_actions() -> Mapping[str, str]:
 
 IN_PAGE = do.Signal.FIND_ERROR, do.Signal.CHOOSE_FILES
 """Commands that a script of the page carries out."""
-
-
-FIRST_HELP = (
-    ("Rotate, pan, zoom", "drag, drag with the right button, wheel"),
-    ("Contributions at a point", "click it on the volume"),
-    ("Enter an exact number", "type digits while a slider has the focus"),
-    ("Next control, activate it", "Tab, then Enter or Space"),
-    ("Move the camera", "A S D Q E"),
-)
-MEANINGS = (
-    ("Solid box", "working volume, each point displaced by its error × exaggeration"),
-    ("Dashed box", "nominal working volume, without errors"),
-    ("Exaggeration", "display factor of the errors; numbers are not exaggerated"),
-    ("Colours", "magnitude or a component (x, y, z) of the error, in the unit of the colour bar"),
-    ("Error", "actual − nominal; a correction has the opposite sign"),
-    ("Mean, P95, max", "statistics of the magnitude of the error over the working volume"),
-)
 
 
 def _section_commands(sections: Iterable[Section]) -> Iterator[Command]:
@@ -235,26 +175,8 @@ class HelpDialog(Dialog):
         return sorted(matching, key=lambda command: not matches(command.label.lower()))
 
     def body(self, picture: LivePicture) -> Markup:
-        query, scene = picture.state.page.command, picture.state.scene
-        label = "Find a command"
-        box = text_box(do.SetLeaf("page.command"), query, label=label, placeholder=label, live=True,
-                       data_enter=do.Input.RUN_FIRST_COMMAND(), autofocus=True)  # fmt: skip
-        commands = join(
-            tag("button", tag("kbd", command.key_label) + command.label, type="button",
-                data_do=do.Input.RUN_COMMAND(command.label))
-            if command.action not in IN_PAGE
-            else tag("p", tag("kbd", command.key_label) + command.label)
-            for command in self._find_commands(query)
-        ) or quiet(f"No command matches “{query}”.")  # fmt: skip
-        about = " ".join(scene.description.split())
-        return join((
-            tag("div", box + tag("div", commands, class_="ws-list ws-columns"), data_list=True),
-            tag("h3", "Mouse and keyboard"), rows(FIRST_HELP, "ws-keys"),
-            tag("h3", "Legend"), rows(MEANINGS, "ws-keys"),
-            quiet("Keys are active except while text is entered. After an interruption of the"
-                " connection, the state of a tab is available for ten minutes."),
-            *((tag("h3", scene.title), tag("p", about)) if about else ()),
-        ))  # fmt: skip
+        query = picture.state.page.command
+        return HTML.help(query, self._find_commands(query), IN_PAGE, picture.state.scene)
 
     @on(do.Input.RUN_COMMAND)
     def run(self, state: AppState, label: str) -> AppState | None:
@@ -274,7 +196,7 @@ class HelpDialog(Dialog):
 
 
 class PagePanel(Panel):
-    """Actions of the whole page: sections, dialogs, undo, redo, and all errors."""
+    """Actions of the whole page: any leaf of the state, sections, dialogs, undo, all errors."""
 
     name = "page"
     refresh = Refresh.IMMEDIATE
@@ -287,26 +209,30 @@ class PagePanel(Panel):
         # an open dialog renders its own content
         return {} if picture.state.page.window else {"window": ""}
 
-    @on(do.Signal.UNDO, later=True)
-    def undo(self) -> None:
-        self._go("undo", self.context.store.undo)
+    @on(do.SetLeaf)
+    def set_leaf(self, state: AppState, action: do.SetLeaf) -> AppState:
+        return put(state, action.path, action.value)
 
-    @on(do.Signal.REDO, later=True)
-    def redo(self) -> None:
-        self._go("redo", self.context.store.redo)
+    @on(do.Signal.UNDO, do.Signal.REDO, later=True)
+    def step(self, signal: do.Signal) -> None:
+        is_undo, store = signal is do.Signal.UNDO, self.context.store
+        try:
+            description = store.undo() if is_undo else store.redo()
+        except OptionError as error:
+            self.context.notes.append(str(error))
+            return
+        done = f"{'Undone' if is_undo else 'Redone'}: {description}"
+        self.context.notify(done if description else f"Nothing to {signal}")
 
     @on(do.Signal.FIT_VIEW, later=True)
     def fit_view(self) -> None:
         self.context.fit_view()
 
-    @on(do.Signal.SHOW_HINTS)
-    def show_hints(self, state: AppState) -> AppState:
-        self.context.call_soon(partial(self.context.page.call, "hints", True))
-        return put(state, "page.window", "")
-
-    @on(do.Signal.CLOSE_DIALOG)
-    def close_dialog(self, state: AppState) -> AppState:
-        self.context.call_soon(self.context.dialog_closed)
+    @on(do.Signal.CLOSE_DIALOG, do.Signal.SHOW_HINTS)
+    def close_dialog(self, state: AppState, signal: do.Signal) -> AppState:
+        show_hints = partial(self.context.page.call, "hints", True)
+        is_close = signal is do.Signal.CLOSE_DIALOG
+        self.context.call_soon(self.context.dialog_closed if is_close else show_hints)
         return put(state, "page.window", "")
 
     @on(do.Input.OPEN_DIALOG)
@@ -319,9 +245,8 @@ class PagePanel(Panel):
 
     @on(do.OpenSection)
     def open_section(self, state: AppState, action: do.OpenSection) -> AppState:
-        state = put(put(state, "page.task", action.task), "page.window", "")
-        opened = state.page.open | {action.section}
-        return replace(state, page=replace(state.page, open=opened))
+        state = put(state, "page.task", action.task)
+        return with_section(state, state.page.task, action.section)
 
     @on(do.Input.TOGGLE_DISPLAY)
     def toggle_display(self, state: AppState, option: str) -> AppState | None:
@@ -330,26 +255,11 @@ class PagePanel(Panel):
             return None
         return replace(state, shown=replace(state.shown, **{option: not is_on}))
 
-    @on(do.Signal.INCLUDE_ERRORS)
-    def include_errors(self, state: AppState) -> AppState:
-        return replace(state, exclusions=Exclusions())
-
-    @on(do.Signal.ZERO_ERRORS)
-    def zero_errors(self, state: AppState) -> AppState:
-        return state.zeroed()
-
-    @on(do.Signal.RESET_ERRORS)
-    def reset_errors(self, state: AppState) -> AppState:
-        return state.reset()
-
-    def _go(self, name: str, go: Callable[[], str]) -> None:
-        try:
-            description = go()
-        except OptionError as error:
-            self.context.notes.append(str(error))
-            return
-        done = {"undo": "Undone", "redo": "Redone"}[name]
-        self.context.notify(f"{done}: {description}" if description else f"Nothing to {name}")
+    @on(do.Signal.INCLUDE_ERRORS, do.Signal.ZERO_ERRORS, do.Signal.RESET_ERRORS)
+    def set_all_errors(self, state: AppState, signal: do.Signal) -> AppState:
+        if signal is do.Signal.INCLUDE_ERRORS:
+            return replace(state, exclusions=Exclusions())
+        return state.zeroed() if signal is do.Signal.ZERO_ERRORS else state.reset()
 
 
 # --- The tasks, and all panels --------------------------------------------------------------------
@@ -383,32 +293,11 @@ class TasksPanel(Panel):
         }
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        task = picture.state.page.task
-        tabs = join(
-            tag(
-                "span", words, role="tab", id=f"ws-task-{name}", class_="ws-tab",
-                data_do=do.SetLeaf("page.task", name), tabindex=0 if name == task else -1,
-                aria_selected=str(name == task).lower(), aria_controls="ws-task",
-            )
-            for name, words in TASKS.items()
-        )  # fmt: skip
-        names = self.sections.get(task, ())
-        places = _places(name for name in names if name not in RARE)
-        rare = _places(name for name in names if name in RARE)
-        if rare:
-            is_open = not picture.state.page.open.isdisjoint(RARE.intersection(names))
-            places += details("More analyses", rare, kind="more", data_key=f"more.{task}",
-                              open=is_open)  # fmt: skip
-        return {
-            "tasks": tag("h2", "Tasks", class_="ws-heard")
-            + tag("div", tabs, role="tablist", aria_label="Tasks", class_="ws-tabs")
-            + tag("div", places, id="ws-task", role="tabpanel", aria_labelledby=f"ws-task-{task}",
-                  data_key=f"task-{task}")
-        }  # fmt: skip
-
-
-def _places(names: Iterable[str]) -> Markup:
-    return join(tag("div", "", data_piece=f"section.{name}") for name in names)
+        page = picture.state.page
+        names = self.sections.get(page.task, ())
+        rare = [name for name in names if name in RARE]
+        is_open = not page.open.isdisjoint(rare)
+        return {"tasks": HTML.tasks(page.task, TASKS, names, rare, is_open)}
 
 
 def build_panels(context: Context) -> list[Panel]:
@@ -423,7 +312,7 @@ def build_panels(context: Context) -> list[Panel]:
     kinds = (
         TopPanel, overlay.HeadPanel, overlay.LegendPanel, overlay.OrderPanel,
         overlay.ControlsPanel, PlaybackPanel, overlay.ComparePanel, ErrorsPanel,
-        overlay.OverlayPanel, StatePanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
+        overlay.OverlayPanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
         machine_editor.MachinesDialog, FilesDialog, ReportDialog, StoryPanel,
     )  # fmt: skip
     panels = [kind(context) for kind in kinds]

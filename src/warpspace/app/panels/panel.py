@@ -24,9 +24,10 @@ from viser import ClientHandle, ViserServer
 from warpspace.analysis.description import Result
 from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button, join, tag, text_box
+from warpspace.app.browser.html import EMPTY, join, tag
 from warpspace.app.browser.incoming import Events
 from warpspace.app.browser.page import Page
+from warpspace.app.browser.templates import Templates
 from warpspace.app.documents.output_services import CancelledError, Services
 from warpspace.app.documents.scene_file import MOST_OPENED, SceneList
 from warpspace.app.drawing.camera import CameraMemory, TabCamera, focus
@@ -39,6 +40,7 @@ from warpspace.app.state.tree import LONGEST, leaves, spell, value
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.scene.notes import story
 
+HTML = Templates("panel")
 MOST_FILES = 16  # that may wait for the session; likewise jobs
 PAUSE_S = 0.1  # without changes: longer than between two moves of a drag
 
@@ -78,6 +80,7 @@ class Context:
         self.notes: list[str] = []  # values that updates of the state clamped
         self._merged: tuple[object, AppState] = (None, store.state)
         self._wake = threading.Event()
+        self.wake = self._wake.set
         self.actions: deque[Callable[[], None]] = deque()
 
     @property
@@ -110,9 +113,6 @@ class Context:
         picture = picture or self.picture
         steps = story(self.store.state.review)
         return {} if picture is None else find_tracks(picture, len(steps))
-
-    def wake(self) -> None:
-        self._wake.set()
 
     def receive(self, message: Events) -> None:
         actions = (*self.events, *message.events)
@@ -211,15 +211,15 @@ ActionKind: TypeAlias = type[do.Action] | do.Signal | do.Input
 F = TypeVar("F", bound=Callable[..., AppState | None])
 
 
-def on(kind: ActionKind, *, later: bool = False) -> Callable[[F], F]:
-    """Mark the handler of an action: ``method(state, action)`` returns the changed state, or None.
+def on(*kinds: ActionKind, later: bool = False) -> Callable[[F], F]:
+    """Mark the handler of actions: ``method(state, action)`` returns the changed state, or None.
 
     A later one, ``method(action)``, leaves the state alone and is called after it is updated. That
-    of a `Signal` is called without the action, that of an `Input` with its text.
+    of a single `Signal` is called without the action, that of an `Input` with its text.
     """
 
     def mark(method: F) -> F:
-        vars(method).update(kind=kind, is_later=later)
+        vars(method).update(kinds=kinds, is_later=later)
         return method
 
     return mark
@@ -227,8 +227,8 @@ def on(kind: ActionKind, *, later: bool = False) -> Callable[[F], F]:
 
 class Panel:
     name: str = ""  # also in the `PanelAction`s for it
-    # method, and whether it is called later, by kind of action
-    handlers: ClassVar[Mapping[object, tuple[str, bool]]] = {}
+    # method, kinds of its actions, and whether it is called later, by kind of action
+    handlers: ClassVar[Mapping[object, tuple[str, tuple[object, ...], bool]]] = {}
     refresh: ClassVar[Refresh] = Refresh.DEBOUNCED
 
     def __init__(self, context: Context) -> None:
@@ -247,8 +247,8 @@ class Panel:
         return {}
 
     def __init_subclass__(cls) -> None:
-        own = {method.kind: (name, method.is_later) for name, method in vars(cls).items()
-               if hasattr(method, "is_later")}  # fmt: skip
+        own = {kind: (name, method.kinds, method.is_later) for name, method in vars(cls).items()
+               for kind in getattr(method, "kinds", ())}  # fmt: skip
         cls.handlers = {**cls.handlers, **own}
 
     def handles(self, action: do.AnyAction) -> bool:
@@ -260,10 +260,10 @@ class Panel:
         """Handle an action; those of other panels change nothing."""
         if not self.handles(action):
             return state
-        name, is_later = self.handlers[do.kind_of(action)]
+        name, kinds, is_later = self.handlers[do.kind_of(action)]
         method: Any = getattr(self, name)
         value = action.value if isinstance(action, do.InputValue) else action
-        values = () if isinstance(action, do.Signal) else (value,)
+        values = () if kinds == (action,) else (value,)  # of a signal
         if not is_later:
             return method(state, *values) or state
         self.context.call_soon(partial(method, *values))
@@ -272,6 +272,12 @@ class Panel:
     def rerender(self) -> None:
         """Render it again whatever its dependencies. For the session."""
         self.context.rerender(self)
+
+
+def with_section(state: AppState, task: str, name: str) -> AppState:
+    """Open a section of a task."""
+    page = replace(state.page, task=task, open=state.page.open | {name}, window="")
+    return replace(state, page=page)
 
 
 class Section(Panel):
@@ -303,15 +309,7 @@ class Section(Panel):
         is_open = self.is_open(picture.state)
         body = self.body(picture) if is_open else EMPTY
         title = self.heading(picture) if is_open else self.title
-        section = html.fold(
-            self.name,
-            title,
-            body,
-            opens=do.Input.FOLD_SECTION(self.name),
-            open_=is_open,
-            hint=self.sentence,
-        )
-        return {f"section.{self.name}": section}
+        return {f"section.{self.name}": HTML.section(self, title, body, is_open)}
 
 
 class Dialog(Panel):
@@ -329,12 +327,7 @@ class Dialog(Panel):
         raise NotImplementedError
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        close = button(
-            "✕", do.Signal.CLOSE_DIALOG, kind="quiet", hint="Close (Esc)", aria_label="Close"
-        )
-        head = tag("header", tag("h2", self.title, id="ws-window-title") + close)
-        body = tag("div", self.body(picture), class_="ws-body", data_key=f"window-{self.name}")
-        return {"window": head + body}
+        return {"window": HTML.dialog(self.name, self.title, self.body(picture))}
 
 
 def actions(*buttons: Markup) -> Markup:
@@ -360,24 +353,13 @@ def details(heading: object, *parts: object, kind: str = "options", **extra: obj
 
 def setting(state: AppState, path: str, *, text: str = "", bar: bool = False) -> Markup:
     """Render the control of a leaf of the state: a switch, a list, a text box or a slider."""
-    leaf, present, name = leaves(state)[path], value(state, path), do.SetLeaf(path)
-    if leaf.kind == "switch":
-        return html.switch(name, leaf.label, on=bool(present), hint=leaf.hint)
-    label, control = leaf.label, text_box(name, spell(state, path))
-    if leaf.kind == "choice":
-        control = html.choice(name, str(present), leaf.choices)
-    elif leaf.kind == "lines":
-        control = tag("textarea", str(present), class_="ws-box", id=html.ident(name), rows=3,
-                      data_set=name, maxlength=LONGEST, placeholder=leaf.hint or None)  # fmt: skip
-    elif leaf.kind == "number":
-        text = text or ("" if present is None else f"{present:.6g}")
-        control = text_box(name, text, size="short", inputmode="decimal",
-                           placeholder=leaf.choices.get("", ""))  # fmt: skip
-        if bar and leaf.span is not None and present is not None:
-            span, label = leaf.span, path.rpartition(".")[2]
-            control = html.slider(name, present, span.low, span.high, span.step, label=leaf.label,
-                             twin=name, text=f"{text} {leaf.unit}") + control  # fmt: skip
-    return html.field(label, control, name, leaf.unit, leaf.hint)
+    leaf, present = leaves(state)[path], value(state, path)
+    if leaf.kind != "number":
+        text = spell(state, path)
+    elif not text and present is not None:
+        text = f"{present:.6g}"
+    bar = bar and leaf.span is not None and present is not None
+    return HTML.setting(leaf, do.SetLeaf(path), present, text, bar, LONGEST)
 
 
 # --- Jobs: long computations in threads of their own, with progress, cancellable ------------------
@@ -442,13 +424,8 @@ class Jobs:
         job = self._job
         if job is None:
             return EMPTY
-        share = html.number(100.0 * job.share, 0) if job.share else None
-        bar = tag("progress", "", max=100, value=share, aria_label=job.name)
-        label = f"{job.name}: {share} %" if share else f"{job.name} …"
-        if self._waiting:
-            label += f" Then: {', '.join(name for name, _ in self._waiting)}"
-        cancel = button("Cancel", do.Cancel(self._panel.name))
-        return tag("div", join((bar, tag("span", label), cancel)), class_="ws-actions ws-run")
+        share = html.number(100.0 * job.share, 0) if job.share else ""
+        return HTML.progress(job.name, share, [name for name, _ in self._waiting], self._panel.name)
 
     def _run(self, job: Job, work: Callable[[Job], None]) -> None:
         error = None

@@ -1,15 +1,13 @@
 """The playback bar: play, pause, scrub and speed of whatever the drawing can play."""
 
-import math
 from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
-from markupsafe import Markup
 
 from warpspace.app.browser import actions as do
-from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button, fill, join, number, tag
+from warpspace.app.browser.html import EMPTY, number
+from warpspace.app.browser.templates import Templates
 from warpspace.app.drawing.player import (
     AXIS_DEG_S,
     EXAGGERATION,
@@ -23,10 +21,12 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import played_axis
 from warpspace.app.panels.panel import Context, Panel, Refresh, on
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.typed_numbers import read_typed
 from warpspace.machine.axes import parameter
 from warpspace.picture.formatting import spell_factor
 from warpspace.units import MINUS
 
+HTML = Templates("playback")
 MOST_LETTERS = 60  # of a line of the program
 MOSTLY = 0.5  # share of an error above which its largest contribution is most of it
 
@@ -46,19 +46,24 @@ class PlaybackPanel(Panel):
         context.player.followers[self.name] = self.rerender
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        player = self.context.player
-        if not (picture.is_rotary or picture.path is not None or player.chosen):
-            return {"playback": EMPTY}
-        tracks = self.context.find_tracks(picture)
+        player, state = self.context.player, picture.state
+        is_used = picture.is_rotary or picture.path is not None or player.chosen
+        tracks = self.context.find_tracks(picture) if is_used else {}
         chosen = self._chosen(tracks, rotary=picture.is_rotary)
         if not chosen:
             return {"playback": EMPTY}
         axes = [name for name in tracks if name not in NO_AXES]
-        row_names = axes if chosen in axes and picture.is_rotary else [chosen]
-        rows = [self._row(picture, name, tracks[name]) for name in row_names]
-        return {
-            "playback": tag("div", join((*rows, *self._buttons(picture.state, tracks, chosen))))
-        }
+        names = axes if chosen in axes and picture.is_rotary else [chosen]
+        speeds = {f"{s:.2g}": f"{AXIS_DEG_S * s:g} °/s" if chosen in axes else f"{s:.1g} ×"
+                  for s in SPEEDS}  # fmt: skip
+        motions: dict[str | None, do.Motion] = {played_axis(state): "rotation"}
+        if not state.shows_rotary:
+            motions[EXAGGERATION] = "exaggeration"
+        return {"playback": HTML.bar(
+            [self._row(picture, name, tracks[name]) for name in names], chosen,
+            {name: name for name in tracks if name != STORY}, f"{player.speed:.2g}", speeds,
+            motions.get(chosen),
+        )}  # fmt: skip
 
     def _chosen(self, tracks: Mapping[str, Track], *, rotary: bool) -> str:
         """Return the track of the bar: the selected one, or that of the drawing."""
@@ -69,61 +74,21 @@ class PlaybackPanel(Panel):
             return axes[-1]
         return next((name for name in (PROGRAM, EXAGGERATION) if name in tracks), "")
 
-    def _row(self, picture: LivePicture, name: str, track: Track) -> Markup:
-        player, subject = self.context.player, name if name not in NO_AXES else f"the {name}"
+    def _row(self, picture: LivePicture, name: str, track: Track) -> tuple[object, ...]:
+        player = self.context.player
         at, plays = min(player.at.get(name, track.start), track.high), player.playing == name
-        text, extra = self._words(picture, name, at, int(track.high) + 1)
-        word = "Pause" if plays else "Play"
-        ends = track.to_slider(track.low), track.to_slider(track.high)
-        return fill(
-            '<div class="ws-turn">{play}<b>{label}</b>{slider}<span>{text}</span></div>{extra}',
-            play=button(word, do.Input.PLAY(name), kind="quiet", aria_label=f"{word} {subject}",
-                        data_key=f"play-{name}", hint=f"{word} {subject} (P)"),
-            label=name if name not in NO_AXES else name.capitalize(), text=text, extra=extra,
-            slider=html.slider(do.Scrub(name), track.to_slider(at), *ends, track.step,
-                               label=f"Position of {subject}", text=text),
-        )  # fmt: skip
-
-    def _words(self, picture: LivePicture, name: str, at: float, count: int) -> tuple[str, Markup]:
-        """Format the position of a track, and what follows its slider."""
+        text, move, code, error = f"{at:.0f}°".replace("-", MINUS), "", "", ""
         if name == EXAGGERATION:
-            return spell_factor(float(f"{at:.3g}")), EMPTY
-        if name == STORY:
-            return f"{int(at) + 1} of {count}", EMPTY
-        if name == PROGRAM:
-            return _program_words(picture, int(at))
-        player, path = self.context.player, do.SetLeaf(f"positions.{name}", str(round(at)))
-        text, stands = f"{at:.0f}°".replace("-", MINUS), name in player.at and not player.playing
-        hint = "Move the axis to the paused position"
-        move = button("Move axes here", path, kind="quiet", hint=hint)
-        return text, move if stands else EMPTY
-
-    def _buttons(self, state: AppState, tracks: Mapping[str, Track], chosen: str) -> list[Markup]:
-        player, is_axis = self.context.player, chosen not in NO_AXES
-        labels = {f"{s:.2g}": f"{AXIS_DEG_S * s:g} °/s" if is_axis else f"{s:.1g} ×"
-                  for s in SPEEDS}  # fmt: skip
-        buttons = [html.choice(do.Input.SET_SPEED(), f"{player.speed:.2g}", labels, label="Speed")]
-        if player.chosen == STORY:
-            return [
-                button("←", do.Signal.PREVIOUS_STEP, kind="quiet", hint="Previous step (←)",
-                       aria_label="Previous step"),
-                button("→", do.Signal.NEXT_STEP, kind="quiet", hint="Next step (→)",
-                       aria_label="Next step"),
-                *buttons,
-                button("End", do.Signal.END_STORY, kind="quiet",
-                       hint="Return to the previous view (Esc)"),
-            ]  # fmt: skip
-        names = {name: name for name in tracks if name != STORY}
-        if len(names) > 1:
-            buttons.insert(0, html.choice(do.Input.CHOOSE_TRACK(), chosen, names, label="Play"))
-        motions: dict[str | None, do.Motion] = {played_axis(state): "rotation"}
-        if not state.shows_rotary:
-            motions[EXAGGERATION] = "exaggeration"
-        if chosen in motions:
-            buttons.append(button("Export", do.SaveAnimation(motions[chosen]), kind="quiet",
-                                  hint="Save as an animated WebP"))  # fmt: skip
-        hint = "Return to the state of the scene"
-        return [*buttons, button("Reset", do.Signal.STOP_PLAYBACK, kind="quiet", hint=hint)]
+            text = spell_factor(float(f"{at:.3g}"))
+        elif name == STORY:
+            text = f"{int(at) + 1} of {int(track.high) + 1}"
+        elif name == PROGRAM:
+            text, code, error = _program_words(picture, int(at))
+        elif name in player.at and not player.playing:
+            move = str(round(at))
+        subject, word = f"the {name}" if name in NO_AXES else name, "Pause" if plays else "Play"
+        position = (*map(track.to_slider, (at, track.low, track.high)), track.step)
+        return name, subject, word, position, text, move, code, error
 
     @on(do.Input.PLAY)
     def play(self, state: AppState, name: str) -> None:
@@ -154,7 +119,7 @@ class PlaybackPanel(Panel):
 
     @on(do.Scrub, later=True)
     def scrub(self, action: do.Scrub) -> None:
-        track, at = self.context.find_tracks().get(action.axis), _read_number(action.value)
+        track, at = self.context.find_tracks().get(action.axis), read_typed(action.value)
         if track is not None and at is not None:
             self.context.player.move(action.axis, track.from_slider(at))
 
@@ -166,40 +131,19 @@ class PlaybackPanel(Panel):
             self.context.player.move(PROGRAM, float(np.argmax(lengths)))
 
 
-def _program_words(picture: LivePicture, sample: int) -> tuple[str, Markup]:
+def _program_words(picture: LivePicture, sample: int) -> tuple[str, str, str]:
     """Format the line of the program; and its text, its error and the main cause of this."""
-    path = picture.path
+    path, state = picture.path, picture.drawn_state
     assert path is not None  # noqa: S101 - checked by `find_tracks`
     line, lines = int(path.of.line[sample]), (picture.state.part.program or "").splitlines()
     code = lines[line - 1][:MOST_LETTERS] if 0 < line <= len(lines) else ""
-    worst = button(
-        "Worst", do.Signal.SHOW_WORST_BLOCK, kind="quiet", hint="Go to the largest error"
-    )
-    error = _error_words(picture, sample)
-    body = fill('{}<div class="ws-line"><code>{}</code> {}</div>', worst, code, error)
-    return f"line {line}", body
-
-
-def _error_words(picture: LivePicture, sample: int) -> str:
-    """Format the error of a sample and the error parameter that contributes most to it."""
-    path, state = picture.path, picture.drawn_state
-    assert path is not None  # noqa: S101 - checked by the panel
     error = path.error_um[sample]
     length = float(np.linalg.norm(error))
     words = f"{number(length)} µm"
-    if picture.is_difference or state.controller is not None or not length:
-        return words
-    amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
-    along = amplitudes * (path.response[:, 3 * sample : 3 * sample + 3] @ error) / length
-    first = int(np.argmax(np.abs(along)))
-    cause = parameter([*state.amplitudes][first]).cause
-    return f"{words}, {share_words(float(along[first]) / length)} because {cause}"
-
-
-def _read_number(text: str) -> float | None:
-    """Parse a number sent by the page; None where it is none."""
-    try:
-        value = float(text[:40])
-    except ValueError:
-        return None
-    return None if math.isnan(value) else value
+    if length and not picture.is_difference and state.controller is None:
+        amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
+        along = amplitudes * (path.response[:, 3 * sample : 3 * sample + 3] @ error) / length
+        first = int(np.argmax(np.abs(along)))
+        cause = parameter([*state.amplitudes][first]).cause
+        words += f", {share_words(float(along[first]) / length)} because {cause}"
+    return f"line {line}", code, words

@@ -15,8 +15,9 @@ from warpspace.analysis.options import Grammar, Option, option, typed_word
 from warpspace.analysis.registry import Entry
 from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button, join, tag, upload_button
+from warpspace.app.browser.html import EMPTY, button
 from warpspace.app.browser.incoming import index_of
+from warpspace.app.browser.templates import Templates
 from warpspace.app.documents.transfers import IN_BOX, upload_text
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import AT_LINE, moved_place, part_overlay
@@ -24,7 +25,7 @@ from warpspace.app.panels.analysis_panel import ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.file_dialogs import accepted_endings
 from warpspace.app.panels.measurement import MOST_BYTES, FilesPanel, UploadedFile
-from warpspace.app.panels.panel import Context, actions, on, quiet, setting
+from warpspace.app.panels.panel import Context, on, setting, with_section
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
 from warpspace.app.state.form_values import option_values, read_form
@@ -41,6 +42,7 @@ from warpspace.scene.model import Scene
 from warpspace.scene.text_files import decode_text
 from warpspace.units import Array
 
+HTML = Templates("uploads")
 NAME = "import"
 MOST_FILES = 16  # read together
 MOST_CURVES, MOST_POINTS = 12, 400
@@ -49,10 +51,6 @@ SIGNS = {
     "correction": "corrections (added by the controller)",
 }
 DIRECTIONS = {FORWARD: "forward", BACKWARD: "backward", UNDIRECTED: "mean"}
-INTRODUCTION = (
-    "Measured errors or compensation tables of a controller. Changes are previewed before they are"
-    " applied. Files can also be dropped on the page."
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,13 +181,8 @@ class ImportPanel(FilesPanel):
         return True
 
     def before_result(self, state: AppState) -> Markup:
-        kind = "" if self.files else "main"
-        upload = upload_button(
-            "Import a file", "files", MAX_UPLOAD_BYTES, accepted_endings(), kind=kind,
-            hint="Files that belong together can be added one after the other",
-        )  # fmt: skip
-        introduction = EMPTY if self.files else tag("p", INTRODUCTION)
-        return introduction + self.files_html() + actions(upload)
+        is_empty = not self.files
+        return HTML.errors(self.files_html(), is_empty, accepted_endings(), MAX_UPLOAD_BYTES)
 
     def result_html(self, result: description.Result) -> Markup:
         return details_html(block for block in result.blocks() if not isinstance(block, str))
@@ -236,11 +229,16 @@ class ImportPanel(FilesPanel):
         else:
             if joined and problem is not None:
                 raise problem
-        return partial(self._show, files, is_joined=is_joined)
+        return partial(self._show, files, keeps_forms=is_joined)
 
-    def _show(self, files: tuple[UploadedFile, ...], *, is_joined: bool) -> None:
+    def _show(self, files: tuple[UploadedFile, ...], *, keeps_forms: bool) -> None:
+        def update(state: AppState) -> AppState:
+            forms = {name: value for name, value in state.forms.items()
+                     if keeps_forms or not name.startswith(f"{NAME}.")}  # fmt: skip
+            return replace(with_section(state, self.task, NAME), forms=forms)
+
         self.set_files(files)
-        self.context.post(partial(_unfolded, keeps_forms=is_joined))
+        self.context.post(update)
 
 
 def _recognised(files: Sequence[UploadedFile]) -> registry.Format | None:
@@ -250,17 +248,9 @@ def _recognised(files: Sequence[UploadedFile]) -> registry.Format | None:
         return None
 
 
-def _unfolded(state: AppState, *, keeps_forms: bool) -> AppState:
-    """Open the section; options for other files are reset."""
-    page = replace(state.page, task="measure", open=state.page.open | {NAME}, window="")
-    forms = {k: v for k, v in state.forms.items() if keeps_forms or not k.startswith(f"{NAME}.")}
-    return replace(state, page=page, forms=forms)
-
-
 # --- The workpiece and the NC program in the working volume ---------------------------------------
 
 MOST_LETTERS = 200  # of a displayed line
-AXES: tuple[Literal["x", "y", "z"], ...] = ("x", "y", "z")  # of the workpiece
 
 
 class SceneOverlayPanel(FilesPanel):
@@ -285,24 +275,13 @@ class SceneOverlayPanel(FilesPanel):
 
     def before_result(self, state: AppState) -> Markup:
         content, name = (getattr(state.part, field) for field in self.part_fields)
-        upload = html.upload_button(
-            f"Another {self.name} …" if content else f"{self.title} …", self.name, self.most_bytes,
-            ",".join(IN_BOX[self.name]), kind="" if content else "main",
-            hint=f"At most {self.most_bytes >> 20} MB; files can also be dropped on the page",
-        )  # fmt: skip
-        missing = "is not loaded: links and saved scenes store only its name. Open it again."
-        about = quiet(f"{name} {missing}") if name else EMPTY
-        if content:
-            remove = button(
-                "✕", do.RemoveOverlay(self.name), kind="link", aria_label=f"Remove {name}"
-            )
-            about = tag("p", join((tag("b", name), " ", remove))) + self.about(state)
-        return join((about, self.files_html(), actions(upload)))
+        about = EMPTY if content is None else self.about(state)
+        return HTML.overlay(self.name, self.title, content, name, about, self.files_html(),
+                            self.most_bytes, ",".join(IN_BOX[self.name]))  # fmt: skip
 
     def show(self, content: object, name: str, **changes: Any) -> None:
         def update(state: AppState) -> AppState:
-            opened = state.page.open | {self.name}
-            state = replace(state, page=replace(state.page, task=self.task, open=opened, window=""))
+            state = with_section(state, self.task, self.name)
             return self.with_content(state, content, name, shown=True, **changes)
 
         self.context.post(update)
@@ -334,15 +313,7 @@ class PartPanel(SceneOverlayPanel):
         return {"place": part.place, "mesh": part.mesh, **files}
 
     def about(self, state: AppState) -> Markup:
-        turns = (button(f"{axis} 90°", do.TurnPart(axis), kind="choice",
-                        hint=f"Rotate by 90° about the workpiece axis {axis}, in place")
-                 for axis in AXES)  # fmt: skip
-        return join((
-            actions(tag("span", "Rotate about"), *turns),
-            *(setting(state, f"part.{name}") for name in ("place", "shown", "normal", "moved")),
-            html.upload_button("Tolerances …", self.name, MAX_SCENE_BYTES, ".toml",
-                               hint="Names and tolerances of the features"),
-        ))  # fmt: skip
+        return HTML.part(partial(setting, state), MAX_SCENE_BYTES)
 
     def result_html(self, result: description.Result) -> Markup:
         *_, features = (block for block in result.blocks() if isinstance(block, Table))
@@ -387,9 +358,7 @@ class ProgramPanel(SceneOverlayPanel):
     def about(self, state: AppState) -> Markup:
         line, text = state.forms.get(AT_LINE, ""), (state.part.program or "").splitlines()
         at = index_of(line, len(text) + 1)
-        if not at:
-            return EMPTY
-        return tag("p", join((tag("b", line), " ", tag("code", text[at - 1][:MOST_LETTERS]))))
+        return HTML.line(line, text[at - 1][:MOST_LETTERS]) if at else EMPTY
 
     def result_html(self, result: description.Result) -> Markup:
         def link(line: int) -> Markup:

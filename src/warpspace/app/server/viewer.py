@@ -21,6 +21,7 @@ from typing import Any, Self
 import viser
 
 from warpspace.app.browser.page import page_script
+from warpspace.app.browser.templates import compile_all
 from warpspace.app.browser.viser_private import connection_of, send_script, serve_with
 from warpspace.app.documents.output_services import Services
 from warpspace.app.documents.scene_file import SceneList
@@ -273,6 +274,7 @@ class Viewer:
     def _warm(self) -> None:
         with contextlib.suppress(Exception):  # reported by the first tab
             surface(self._live.evaluate(self._start))
+            compile_all()
 
     async def _connect(self, client: viser.ClientHandle) -> None:
         connection = connection_of(self.server, client)
