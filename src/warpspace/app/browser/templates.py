@@ -3,15 +3,25 @@
 `Templates("design").limit(value=...)` renders the macro `limit` of `templates/design.html.j2`.
 A macro knows the elements of `html.py` (`button`, `field`, `section` ...) and the actions as `do`.
 Every text that is not `Markup` is escaped, also what a macro receives; an unknown name is an error.
+Line breaks between elements are for readers of the template only.
 """
 
+import re
 from collections.abc import Callable
 from functools import cache
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from jinja2.ext import Extension
 from markupsafe import Markup
 
 from warpspace.app.browser import actions, html
+
+
+class Compact(Extension):
+    """Removes line breaks between elements, which the page would show as blanks."""
+
+    def preprocess(self, source: str, name: object, filename: object = None) -> str:  # noqa: ARG002
+        return re.sub(r"(?<=[>}])\s*\n\s*(?=[<{])", "", source)
 
 
 @cache
@@ -22,9 +32,16 @@ def _environment() -> Environment:
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        extensions=[Compact],
     )
     environment.globals |= vars(html) | {"do": actions}
     return environment
+
+
+def compile_all() -> None:
+    """Compile all templates, so that the first page does not wait for it."""
+    for name in _environment().list_templates():
+        _environment().get_template(name)
 
 
 class Templates:
