@@ -13,9 +13,9 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.app.browser import actions as do
-from warpspace.app.browser.html import EMPTY, button, field, fill, join, number, tag, text_box
+from warpspace.app.browser.templates import Templates
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.panel import Section, actions, details, on, tiny
+from warpspace.app.panels.panel import Section, on
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import linear_spans
@@ -34,6 +34,7 @@ from warpspace.scene.model import Scene, evaluate_grid
 from warpspace.scene.scene_writer import covered_spans
 from warpspace.units import Array
 
+HTML = Templates("conventions")
 Effect = tuple[float, float]
 """Mean over the volume and largest length of the change of the error vector, µm."""
 
@@ -227,26 +228,6 @@ def _measured_in_the_middle(scene: Scene) -> ErrorSet:
 
 # --- The section ----------------------------------------------------------------------------------
 
-COSTS = {
-    "squareness=over_90": "squareness: positive if the angle exceeds 90°",
-    "squareness=under_90": "squareness: positive if the angle is below 90°",
-    "measuring_line": "measuring line: through the centre of the volume",
-    "end_point": "straightness: end-point line subtracted",
-    "least_squares": "straightness: least-squares line subtracted",
-    "minimum_zone": "straightness: minimum-zone line subtracted",
-    "zero_at": "curves: zero at the middle of each axis",
-}
-NOTE = (
-    "Change of the error vector over the grid nodes, for the displayed loop: each choice alone,"
-    " relative to the conventions of the scene."
-)
-RADIO = '<label><input type="radio" name="{}" value="{}"{} data-set="{}"> {}</label>'
-COST_NOTE = (
-    "First-order effect of a wrong assumption about the measured data. The scene assumes squareness"
-    " by the right-hand rule, measuring lines through the origin of each axis, straightness"
-    " including tilt, and curves without offset removal."
-)
-
 
 class ConventionsSection(Section):
     name, task, title = "conventions", "machine", "Conventions"
@@ -264,29 +245,16 @@ class ConventionsSection(Section):
         state = picture.state
         effects, in_force = effects_of(state), chosen(state.scene)
         scene_choices = chosen(with_own_conventions(state).scene)
-        lines = [fill("<tr><th>µm</th><th class=number>mean</th><th class=number>max</th></tr>")]
-        for head, members in choice_groups(state.scene).items():
-            lines.append(fill('<tr><th colspan="3"><b>{}</b> {}</th></tr>', *head))
-            for choice, label in members.items():
-                checked = Markup(" checked") if choice in in_force else ""
-                title = f"{label} (scene)" if choice in scene_choices else label
-                radio = fill(
-                    RADIO,
-                    choice.partition("=")[0],
-                    choice,
-                    checked,
-                    do.Input.CHOOSE_CONVENTION(),
-                    title,
-                )
-                lines.append(_row(radio, None if choice in scene_choices else effects[choice]))
-        lines.append(_row("all choices together", effects["all"]))
-        reset = button(
-            "Reset to the scene", do.Signal.RESET_CONVENTIONS, disabled=in_force == scene_choices
+        scene, reference = state.active_scene(), ""
+        costs = convention_costs(scene, scene.view(state.loop), state.nodes)
+        if scene.reference is not None:
+            at = {**scene.workspace.positions, **scene.reference}
+            reference = " ".join(f"{axis} {at[axis]:g}" for axis in linear_spans(scene))
+        has_point = state.picked is not None and state.picked.point_mm is None
+        groups = choice_groups(scene)
+        return HTML.conventions(
+            groups, in_force, scene_choices, effects, reference, has_point, costs
         )
-        return join((
-            tag("table", join(lines), class_="ws-choices-table"), tiny(NOTE),
-            _reference(state), actions(reset), _wrong(state),
-        ))  # fmt: skip
 
     @on(do.Input.CHOOSE_CONVENTION)
     def choose(self, state: AppState, choice: str) -> AppState:
@@ -307,31 +275,3 @@ class ConventionsSection(Section):
             return with_reference(state, at)
         expected = f"expected axis positions, for example {EXAMPLE}"
         return state.noted(f"point {text[:40]!r}: {expected}")
-
-
-def _reference(state: AppState) -> Markup:
-    if state.scene.reference is None:
-        return EMPTY
-    positions = {**state.scene.workspace.positions, **state.scene.reference}
-    text = " ".join(f"{axis} {positions[axis]:g}" for axis in linear_spans(state.scene))
-    name, hint = do.Input.SET_REFERENCE(), "First click a point of the volume"
-    box = field("Reference point", text_box(name, text), name, hint="Axis positions")
-    nowhere = state.picked is None or state.picked.point_mm is not None
-    pick = button(
-        "Use the clicked point", do.Signal.USE_PICKED_REFERENCE, hint=hint, disabled=nowhere
-    )
-    return box + actions(pick)
-
-
-def _row(label: object, effect: Effect | None) -> Markup:
-    cells = ("–", "–") if effect is None else map(number, effect)
-    line = '<tr><td>{}</td><td class="number">{}</td><td class="number">{}</td></tr>'
-    return fill(line, label, *cells)
-
-
-def _wrong(state: AppState) -> Markup:
-    scene = state.active_scene()
-    costs = convention_costs(scene, scene.view(state.loop), state.nodes)
-    rows = [_row(label, costs.get(name)) for name, label in COSTS.items()]
-    heading = "Effect of data measured in another convention"
-    return details(heading, tiny(COST_NOTE), tag("table", join(rows)))
