@@ -1,5 +1,6 @@
 """Contributions to the error of a point, distances between points, and volume statistics."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from warpspace.analysis.commands.contributions import PointContribution
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.analysis.uncertainty.propagation import NAMES
 from warpspace.app.browser import actions as do
-from warpspace.app.browser.html import EMPTY, join, number, rows
+from warpspace.app.browser.html import EMPTY, join, number
 from warpspace.app.browser.templates import Templates
 from warpspace.app.drawing.camera import fit_camera
 from warpspace.app.evaluation import point_explanation
@@ -66,7 +67,7 @@ class WorstPanel(Section):
         if explanation.is_corrected:
             residual_um = float(np.linalg.norm(explanation.drawn_um))
         return HTML.worst(
-            explanation, "" if state.picked is None else _axes(explanation),
+            explanation, "" if state.picked is None else _spelt(explanation.at),
             [(c.key, parameter(c.key).name, c.along_um) for c in largest],
             len(others), explanation.length_um - sum(c.along_um for c in largest), residual_um,
             _uncertainty(explanation, state.specification.limit_um),
@@ -114,8 +115,8 @@ class WorstPanel(Section):
             self.context.move_camera(pose)
 
 
-def _axes(explanation: PointExplanation) -> str:
-    return formatting.spell_axes(explanation.at).removeprefix("axes ")
+def _spelt(positions: Mapping[str, float]) -> str:
+    return formatting.spell_axes(positions).removeprefix("axes ")
 
 
 def _uncertainty(explanation: PointExplanation, limit_um: float | None) -> Markup:
@@ -153,7 +154,7 @@ def _details(explanation: PointExplanation, lever: str) -> Markup:
     tilt, loop = float(np.linalg.norm(point.orientation_urad)), explanation.loop
     levers = [(c, parameter(c.key), _arm_mm(c)) for c in ranked if c.key == lever]
     return HTML.details(
-        _axes(explanation), EXAMPLE, place, formatting.LOOP_WORDS[loop], tilt,
+        _spelt(explanation.at), EXAMPLE, place, formatting.LOOP_WORDS[loop], tilt,
         block_html(Table(columns, lines)), levers, copied,
     )  # fmt: skip
 
@@ -195,22 +196,19 @@ class VolumePanel(Section):
     sentence = "Mean, RMS, P95 and max of the position error, and of the tilt of the tool axis"
 
     def body(self, picture: LivePicture) -> Markup:
-        statistics, state = picture.statistics, picture.drawn_state
+        statistics, state, grid = picture.statistics, picture.drawn_state, picture.grid
         u95 = {} if picture.uncertainty is None else picture.uncertainty.statistics()
         intervals = {NAMES[key]: formatting.u95_behind(value) for key, value in u95.items()}
-        lines = [(name, f"{number(value)}{intervals.get(name, '')} µm")
-                 for name, value in zip(NAMES.values(), statistics.four, strict=True)]  # fmt: skip
+        values = dict(zip(NAMES.values(), statistics.four, strict=True))
+        tilt = None
         if not picture.is_difference:
             # the picture holds it only if the map is coloured by it
-            errors = evaluate_grid(state.active_scene(), picture.grid, picture.view)
-            tilt = volume_statistics(errors.tilts, picture.grid)
-            lines += [("tilt, mean", f"{number(tilt.mean_um)} µrad"),
-                      ("tilt, max", f"{number(tilt.max_um)} µrad")]  # fmt: skip
-        size = " × ".join(number(float(edge), 0) for edge in picture.grid.extent_mm)
-        lines += [
-            ("nodes", spell_count(picture.field.norm_um.size)),
-            ("volume", f"{size} mm"),
-            ("loop", ", ".join((formatting.LOOP_WORDS[state.loop], *placed_words(state.view())))),
-        ]
-        at = formatting.spell_axes(statistics.max_at_axes).removeprefix("axes ")
-        return rows(lines) + tiny(f"max at {at} · {formatting.spell_in_r(statistics.max_at_mm)} mm")
+            tilt = volume_statistics(
+                evaluate_grid(state.active_scene(), grid, picture.view).tilts, grid
+            )
+        loop = ", ".join((formatting.LOOP_WORDS[state.loop], *placed_words(state.view())))
+        at, at_mm = _spelt(statistics.max_at_axes), formatting.spell_in_r(statistics.max_at_mm)
+        return HTML.volume(
+            values, intervals, tilt, spell_count(picture.field.norm_um.size), grid.extent_mm, loop,
+            at, at_mm,
+        )  # fmt: skip
