@@ -291,13 +291,16 @@ class AnalysisPanel(Section):
         else:
             self._run(state)
 
-    def _run_job(self, name: str, compute: Callable[[Job], T], accept: Callable[[T], None]) -> None:
+    def _run_job(
+        self, name: str, compute: Callable[[Job], T], accept: Callable[[T], None],
+        jobs: Jobs | None = None,
+    ) -> None:  # fmt: skip
         def work(job: Job) -> None:
             product = compute(job)
             if not job.is_set():
                 self.context.call_soon(partial(accept, product))
 
-        self._jobs.start(name, work)
+        (jobs or self._jobs).start(name, work)
 
     def _accept_outcome(self, outcome: AnalysisOutcome) -> None:
         self.outcome, self.problem = outcome, None

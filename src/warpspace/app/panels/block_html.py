@@ -86,7 +86,7 @@ def _first_bars(bars: Bars) -> Markup:
 class PlotFrame:
     """Limits of the two axes of a chart, and the transformation to its drawing."""
 
-    LEFT, RIGHT, TOP, FLOOR = 40.0, 312.0, 8.0, 160.0
+    MARGIN, RIGHT, TOP, FLOOR = 40.0, 312.0, 8.0, 160.0
     BOX = "0 0 320 190"  # of the drawing, in the same units
 
     x: tuple[float, float]
@@ -96,13 +96,13 @@ class PlotFrame:
         """Compute points of the drawing, [..., 2]."""
         across = (x - self.x[0]) / (self.x[1] - self.x[0])
         up = (y - self.y[0]) / (self.y[1] - self.y[0])
-        left, floor = self.LEFT, self.FLOOR
-        points = left + (self.RIGHT - left) * across, floor - (floor - self.TOP) * up
-        return np.stack(np.broadcast_arrays(*points), axis=-1)
+        columns = self.MARGIN + (self.RIGHT - self.MARGIN) * across
+        rows = self.FLOOR - (self.FLOOR - self.TOP) * up
+        return np.stack(np.broadcast_arrays(columns, rows), axis=-1)
 
     def to_scale(self) -> "PlotFrame":
         """Widen one of the axes until a unit is as long on both."""
-        rooms = (self.x, self.RIGHT - self.LEFT), (self.y, self.FLOOR - self.TOP)
+        rooms = (self.x, self.RIGHT - self.MARGIN), (self.y, self.FLOOR - self.TOP)
         per = max((high - low) / room for (low, high), room in rooms) / 2.0
         x, y = (
             ((low + high) / 2.0 - per * room, (low + high) / 2.0 + per * room)

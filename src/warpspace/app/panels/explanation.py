@@ -62,17 +62,13 @@ class WorstPanel(Section):
         if self._is_nominal(picture):
             return quiet("No errors: every point is at its nominal position.")
         explanation, state = self._explain(picture), picture.state
-        largest, others = explanation.ranked[:FIRST], explanation.ranked[FIRST:]
+        at = "" if state.picked is None else _spelt(explanation.at)
         residual_um = None
         if explanation.is_corrected:
             residual_um = float(np.linalg.norm(explanation.drawn_um))
-        return HTML.worst(
-            explanation, "" if state.picked is None else _spelt(explanation.at),
-            [(c.key, parameter(c.key).name, c.along_um) for c in largest],
-            len(others), explanation.length_um - sum(c.along_um for c in largest), residual_um,
-            _uncertainty(explanation, state.specification.limit_um),
-            _details(explanation, state.lever),
-        )  # fmt: skip
+        uncertainty = _uncertainty(explanation, state.specification.limit_um)
+        details = _details(explanation, state.lever)
+        return HTML.worst(explanation, at, FIRST, parameter, residual_um, uncertainty, details)
 
     def _is_nominal(self, picture: LivePicture) -> bool:
         return picture.state.picked is None and not picture.field.error_um.any()

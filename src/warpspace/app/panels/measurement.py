@@ -23,7 +23,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import chosen_test, plan_test
 from warpspace.app.panels.analysis_panel import AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
-from warpspace.app.panels.panel import Context, Job, Jobs, on
+from warpspace.app.panels.panel import Context, Jobs, on
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import TEST, with_form
@@ -82,13 +82,7 @@ class FilesPanel(AnalysisPanel):
 
     def receive(self, read: Callable[[], tuple[str, bytes]]) -> None:
         """Parse files in jobs, one after the other; errors are shown above the files."""
-
-        def work(job: Job) -> None:
-            accept = self.parse(*read())
-            if not job.is_set():
-                self.context.call_soon(partial(self._accept, accept))
-
-        self._uploads.start("Reading", work)
+        self._run_job("Reading", lambda _: self.parse(*read()), self._accept, self._uploads)
 
     def _accept(self, accept: Callable[[], None]) -> None:
         self._upload_problem = ""
