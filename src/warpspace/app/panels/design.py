@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from string import ascii_uppercase
 from typing import Any
 
 import numpy as np
@@ -28,7 +27,6 @@ from warpspace.app.panels.panel import alert, on, setting
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.leaf import Identity
-from warpspace.app.state.typed_numbers import spell_typed
 from warpspace.exceptions import WarpspaceError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
@@ -41,7 +39,6 @@ HTML = Templates("design")
 SAMPLES = 20_000  # machines per probability on the page
 ENSEMBLES: Cache[Ensemble] = Cache(100_000_000)
 """Sampled machines before tolerances are applied, for all sessions."""
-WHERE = {"max": "everywhere", "sampled": "at a random point"}
 SCALES = {"÷ 1.5": 1.0 / 1.5, "−5 %": 0.95, "+5 %": 1.05, "× 1.5": 1.5}
 """Factors for all tolerances, by label."""
 
@@ -122,8 +119,8 @@ class TolerancesPanel(AnalysisPanel):
             histogram.counts.astype(float), limit=specification.limit_um,
         )  # fmt: skip
         return HTML.probability(
-            controls, specification, WHERE[specification.over], stream, probability,
-            histogram_html(chart), percent, spell_count(stream.count),
+            controls, specification, stream, probability, histogram_html(chart), percent,
+            spell_count(stream.count),
         )  # fmt: skip
 
     def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
@@ -137,13 +134,7 @@ class TolerancesPanel(AnalysisPanel):
             self._order = order_key, tuple(sorted(shares, key=lambda key: -shares[key]))
         widths = {key: edits.half_width_of(state, key) for key in self._order[1]}
         lines = [
-            (
-                parameter(key),
-                width,
-                spell_typed(width),
-                edits.half_width_span(state, key),
-                shares[key],
-            )
+            (parameter(key), width, edits.half_width_span(state, key), shares[key])
             for key, width in widths.items()
         ]
         longest = max(shares.values(), default=0.0) or 1.0
@@ -278,10 +269,7 @@ class ConceptsPanel(AnalysisPanel):
         offers = self.offers(state)
         chosen = [key for key in self.chosen(state) if key in offers]
         remaining = {"": "Compare with …", **{key: key for key in offers if key not in chosen}}
-        lettered = list(zip(ascii_uppercase, chosen, strict=False))
-        return HTML.machines(
-            PRESENT, state.scene.title, lettered, remaining, MOST_CONCEPTS, self.is_ready(state)
-        )
+        return HTML.machines(PRESENT, state.scene.title, chosen, remaining, MOST_CONCEPTS)
 
     def actions(self, result: Result, *, stale: bool) -> Markup:
         """Render the buttons below a result, the picture for a review first."""
