@@ -9,6 +9,7 @@ Line breaks between elements are for readers of the template only.
 import re
 from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from jinja2.ext import Extension
@@ -34,7 +35,8 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         extensions=[Compact],
     )
-    environment.globals |= vars(html) | {"do": actions}
+    elements: dict[str, Any] = {**vars(html), "do": actions}
+    environment.globals.update(elements)
     return environment
 
 
