@@ -69,10 +69,11 @@ def _traces(picture: LivePicture) -> Markup:
     chosen = moved.get(name)
     motion = motions[name] if name in motions else chosen and motion_of(picture, chosen)
     plots: list[tuple[str, Markup, str]] = []
-    for part in motion.motions if motion else ():
-        chart = motion_lines(part.name, motion, part)
-        plot = block_html(replace(chart, title=part.name, note=""))
-        plots.append((part.iso, plot, chart.note))
+    if motion is not None:
+        for part in motion.motions:
+            chart = motion_lines(part.name, motion, part)
+            plot = block_html(replace(chart, title=part.name, note=""))
+            plots.append((part.iso, plot, chart.note))
     names = {trace: trace for trace in moved}
     return HTML.traces(name, names, plots, picture.is_rotary, motions)
 
