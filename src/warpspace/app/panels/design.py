@@ -13,7 +13,7 @@ from warpspace.analysis.description import Result
 from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.options import Option, read_numbers
 from warpspace.analysis.sampling.cases import Case, Reduction, SamplingPlan
-from warpspace.analysis.sampling.distribution import Distribution, Draws, Probability, Stream
+from warpspace.analysis.sampling.distribution import Distribution, Draws
 from warpspace.analysis.sampling.tolerance_search import Ensemble, build_ensemble
 from warpspace.analysis.sampling.worst_case import worst_case_um
 from warpspace.app.browser import actions as do
@@ -30,10 +30,9 @@ from warpspace.app.state.leaf import Identity
 from warpspace.exceptions import WarpspaceError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
-from warpspace.machine.errors import Tolerance, ToleranceSet
 from warpspace.machine.limits import MOST_CONCEPTS
 from warpspace.scene.model import Scene
-from warpspace.units import Array, spell_count
+from warpspace.units import spell_count
 
 HTML = Templates("design")
 SAMPLES = 20_000  # machines per probability on the page
@@ -112,14 +111,14 @@ class TolerancesPanel(AnalysisPanel):
         except WarpspaceError as error:
             return controls + alert(self.spell_error(error))
         specification = state.specification
-        stream, probability = estimate(ensemble, state.tolerances, specification.limit_um)
+        stream = ensemble.estimate(state.tolerances, specification.limit_um)
         histogram = stream.display_histogram()
         chart = Histogram(
             "|E| of the machines", "", "|E| [µm]", "machines", histogram.edges_um,
             histogram.counts.astype(float), limit=specification.limit_um,
         )  # fmt: skip
         return HTML.probability(
-            controls, specification, stream, probability, histogram_html(chart), percent,
+            controls, specification, stream, stream.probability(), histogram_html(chart), percent,
             spell_count(stream.count),
         )  # fmt: skip
 
@@ -128,7 +127,7 @@ class TolerancesPanel(AnalysisPanel):
         if not _can_sample(state):
             return options
         ensemble = sample_machines(state)
-        shares = tolerance_shares(ensemble, state.tolerances)
+        shares = ensemble.variance_shares(state.tolerances)
         order_key: ResultKey = (Identity(state.origin), ensemble.keys)
         if self._order[0] != order_key:  # rows must not move during a drag
             self._order = order_key, tuple(sorted(shares, key=lambda key: -shares[key]))
@@ -188,7 +187,7 @@ def allowed_words(state: AppState) -> Markup:
     if not _can_sample(state):
         return EMPTY
     ensemble = sample_machines(state)
-    ranges = _centres_and_widths(ensemble, state.tolerances)
+    ranges = ensemble.ranges(state.tolerances)
     largest = float(ensemble.norm_um(*ranges).max())
     if not largest:
         return EMPTY
@@ -196,29 +195,6 @@ def allowed_words(state: AppState) -> Markup:
     if ensemble.spread is None:  # all machines at the same points
         worst_um = worst_case_um(ensemble.gains.astype(float), *ranges)
     return HTML.allowed(largest, worst_um, spell_count(len(ensemble.unit)))
-
-
-def _centres_and_widths(ensemble: Ensemble, tolerances: ToleranceSet) -> Array:
-    zero = Tolerance(0.0, 0.0)
-    ranges = [tolerances.get(key) or zero for key in ensemble.keys]
-    return np.array([[t.centre for t in ranges], [t.half_width for t in ranges]])
-
-
-def estimate(
-    ensemble: Ensemble, tolerances: ToleranceSet, limit_um: float | None
-) -> tuple[Stream, Probability | None]:
-    """Evaluate the machines of a tolerance set, and the probability of meeting a limit."""
-    norm_um = ensemble.norm_um(*_centres_and_widths(ensemble, tolerances))
-    stream = Stream(len(norm_um), limit_um)
-    stream.add(norm_um)
-    return stream, stream.probability()
-
-
-def tolerance_shares(ensemble: Ensemble, tolerances: ToleranceSet) -> dict[str, float]:
-    _, half_widths = _centres_and_widths(ensemble, tolerances)
-    variances = half_widths**2 * ensemble.mean_square_gain
-    shares = variances / (float(variances.sum()) or 1.0)
-    return dict(zip(ensemble.keys, shares.tolist(), strict=True))
 
 
 # --- Concepts -------------------------------------------------------------------------------------
