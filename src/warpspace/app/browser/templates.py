@@ -35,8 +35,8 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         extensions=[Compact],
     )
-    elements: dict[str, Any] = {**vars(html), "do": actions}
-    environment.globals.update(elements)
+    names: Any = environment.globals
+    names.update(vars(html), do=actions)
     return environment
 
 
