@@ -7,6 +7,7 @@ import pytest
 
 from app.parts import lone_part
 from warpspace.analysis.commands.adjust import apply_adjustments
+from warpspace.analysis.convention_costs import convention_costs
 from warpspace.app.browser import actions as do
 from warpspace.app.documents.legend import order_conditions, picture_conditions, subject_words
 from warpspace.app.documents.scene_file import open_text, state_to_toml
@@ -178,7 +179,7 @@ VOLUME = Workspace({"X": SPAN, "Y": (0.0, 0.0), "Z": (0.0, 0.0)})
 def test_costs_by_hand(key, curve, cost, free):
     machine = build_machine("wFXYZt", offset_mm={"t": (0.0, 0.0, -300.0)})
     scene = Scene("own", "", Model(machine), VOLUME, ErrorSet({key: curve}))
-    found = conventions.convention_costs(scene, View())
+    found = convention_costs(scene, View())
     largest = 2.0 if key == "EYX" else 1.0  # a tilt about the middle is largest at the ends
     for name, mean in cost.items():
         assert found[name] == pytest.approx((mean, largest * mean))

@@ -78,13 +78,14 @@ def state_of(scene, loop=Loop.TOOL, limit_um=60.0, **wanted):
 )
 def test_a_probability_is_that_of_the_command(loop, over, distribution):
     ensemble = design.sample_machines(state_of(SCENE, loop, over=over, distribution=distribution))
-    live, kept = design.estimate(ensemble, SCENE.tolerances, 60.0)
+    live = ensemble.estimate(SCENE.tolerances, 60.0)
+    kept = live.probability()
     asked = {"loop": loop, "over": over, "distribution": distribution}
     found = warpspace.montecarlo(SCENE, samples=design.SAMPLES, limit_um=60.0, **asked)
     assert live.mean_um == pytest.approx(found.mean_um, rel=1e-6)
     assert live.quantile(0.95) == pytest.approx(found.p95_um, rel=1e-6)
     assert kept.probability == pytest.approx(found.probability.probability, abs=1e-4)
-    assert sum(design.tolerance_shares(ensemble, SCENE.tolerances).values()) == pytest.approx(1.0)
+    assert sum(ensemble.variance_shares(SCENE.tolerances).values()) == pytest.approx(1.0)
 
 
 def test_the_worst_point_of_the_workpiece_loop_is_refused_with_a_way_out():
@@ -103,7 +104,7 @@ def test_an_allocation_reaches_what_was_wanted_and_is_one_change():
     (update,) = part.context.posted
     after = update(state)
     # the machines of the page are those of the allocation, and the lower end of the interval counts
-    (_, shown) = design.estimate(design.sample_machines(state), after.tolerances, 40.0)
+    shown = design.sample_machines(state).estimate(after.tolerances, 40.0).probability()
     found = part.outcome.result
     assert shown == found.after
     assert 0.98 <= shown.low < 0.983

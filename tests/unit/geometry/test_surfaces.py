@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from warpspace.app.evaluation.point_explanation import pick_point, pick_surface
 from warpspace.geometry.colour import build_scale
+from warpspace.geometry.rays import pick_point, pick_surface
 from warpspace.geometry.surfaces import (
     above_limit,
     box_edges,

@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.sampling.cases import Case, Reduction
+from warpspace.analysis.sampling.distribution import Stream
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
+from warpspace.machine.errors import Tolerance, ToleranceSet
 from warpspace.units import Array
 
 SAMPLES = 20_000
@@ -61,6 +63,25 @@ class Ensemble:
         error = self.error_um(centre, half_width)
         square = np.einsum("c...,c...->...", error, error)
         return np.sqrt(square if square.ndim == 1 else square.max(axis=1)).astype(float)
+
+    def ranges(self, tolerances: ToleranceSet) -> Array:
+        """Return centre and half-width of each parameter, [2, K]; zeros without a tolerance."""
+        zero = Tolerance(0.0, 0.0)
+        tolerance_row = [tolerances.get(key) or zero for key in self.keys]
+        return np.array([[t.centre for t in tolerance_row], [t.half_width for t in tolerance_row]])
+
+    def estimate(self, tolerances: ToleranceSet, limit_um: float | None) -> Stream:
+        """Evaluate |E| of the machines of a tolerance set."""
+        norm_um = self.norm_um(*self.ranges(tolerances))
+        stream = Stream(len(norm_um), limit_um)
+        stream.add(norm_um)
+        return stream
+
+    def variance_shares(self, tolerances: ToleranceSet) -> dict[str, float]:
+        """Compute the share of each tolerance in the variance of the error."""
+        variances = self.ranges(tolerances)[1] ** 2 * self.mean_square_gain
+        shares = variances / (float(variances.sum()) or 1.0)
+        return dict(zip(self.keys, shares.tolist(), strict=True))
 
     def norm_and_slope(
         self, centre: Array, half_width: Array

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from warpspace.analysis.commands.contributions import Explanation, PointContribution, explain
@@ -18,6 +17,7 @@ from warpspace.app.state.leaf import Identity
 from warpspace.exceptions import WarpspaceError
 from warpspace.field.evaluate import ErrorField, evaluate_exact, evaluate_first_order
 from warpspace.field.grid import seen_from_workpiece
+from warpspace.geometry.rays import pick_point, pick_surface
 from warpspace.geometry.surfaces import deform
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
@@ -31,7 +31,6 @@ from warpspace.units import Array
 TOLERANCE_RAD = 0.0032  # from a click to a trace: about seven pixels of the default view
 BETWEEN = 5  # points per sample of a trace: one degree apart
 REACH_MM = 1e7  # largest distance of a camera
-PARALLEL = 1e-12
 
 
 @dataclass(frozen=True)
@@ -257,43 +256,3 @@ def _measure_distance(of: Identity) -> tuple[DistanceResult, Array, Array] | Non
     except WarpspaceError:  # reported in its section
         return None
     return measurement, drawn_mm, deform(drawn_mm, field.error_um, picture.exaggeration)
-
-
-# --- Rays from the camera -------------------------------------------------------------------------
-
-
-def pick_surface(
-    origin: Array, direction: Array, vertices: Array, triangles: NDArray[np.intp]
-) -> tuple[NDArray[np.intp], Array, float] | None:
-    """Find the first of the triangles, [T, 3], on a ray; None where the ray misses.
-
-    Origin and direction, [3], are in the units of the vertices, [M, 3]. Return the vertex numbers
-    of the triangle, [3], the barycentric weights of the point in it, [3], and its distance along
-    the ray, in lengths of the direction.
-    """
-    a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
-    edges = np.stack([b - a, c - a, np.broadcast_to(-direction, a.shape)], axis=-1)
-    edges[np.abs(np.linalg.det(edges)) < PARALLEL] = np.nan
-    u, v, distance = np.linalg.solve(edges, (origin - a)[..., None])[..., 0].T
-    inside = (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 0)
-    if not inside.any():
-        return None
-    at = int(np.argmin(np.where(inside, distance, np.inf)))
-    return triangles[at], np.array([1.0 - u[at] - v[at], u[at], v[at]]), float(distance[at])
-
-
-def pick_point(
-    origin: Array, direction: Array, points: Array, tolerance: float
-) -> tuple[int, float] | None:
-    """Find the point, [M, 3], with the smallest angle to a ray.
-
-    Return its index and its distance along the ray; None where the angle exceeds a tolerance, rad.
-    """
-    if len(points) == 0:
-        return None
-    unit, sight = direction / np.linalg.norm(direction), points - origin
-    along = sight @ unit
-    offset = np.linalg.norm(sight - along[:, None] * unit, axis=-1)
-    angle = np.where(along > 0.0, np.arctan2(offset, np.maximum(along, PARALLEL)), np.inf)
-    nearest = int(np.argmin(angle))
-    return (nearest, float(along[nearest])) if angle[nearest] <= tolerance else None

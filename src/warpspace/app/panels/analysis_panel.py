@@ -20,25 +20,15 @@ from warpspace.analysis.description import Analysis, Change, Result
 from warpspace.analysis.options import Option
 from warpspace.analysis.registry import Entry
 from warpspace.app.browser import actions as do
-from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button, field, join, tag, text_box
+from warpspace.app.browser.html import EMPTY, join, number
 from warpspace.app.browser.page import error_words
+from warpspace.app.browser.templates import Templates
 from warpspace.app.evaluation import compare
 from warpspace.app.evaluation.cache import exclusive_work
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import block_html, result_html
 from warpspace.app.panels.file_dialogs import PLAIN, limit_words
-from warpspace.app.panels.panel import (
-    Context,
-    Job,
-    Jobs,
-    Section,
-    actions,
-    alert,
-    details,
-    on,
-    quiet,
-)
+from warpspace.app.panels.panel import Context, Job, Jobs, Section, alert, on, tiny
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import LONGEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
@@ -61,10 +51,8 @@ OF_STATE = frozenset({"loop", "placed", "limit_um"})  # options set once, for th
 QUICK_S = 1.0  # an analysis that takes less is repeated after each change
 MOST_STEPS = 4  # errors listed on a card
 SAME = 1e-3  # µm or µrad; smaller changes of an error are not listed
-RECORD = button("Record decision", do.Signal.RECORD_DECISION,
-                hint="Record the change and its reason as a note")  # fmt: skip
-UNSET = ""  # value of an option that the analysis chooses
-EXAMPLES = {"X=..,Y=..": "X=0,B=30", "X,Y,Z": "100,0,50"}
+EXAMPLES = {"X=..,Y=..": "X=0,B=30", "X,Y,Z": "100,0,50"}  # by metavariable
+HTML = Templates("analysis_panel")
 T = TypeVar("T")
 ResultKey = tuple[object, ...]
 
@@ -81,6 +69,7 @@ class AnalysisPanel(Section):
 
     runs_on_open = False
     run_label, run_hint = "Run", ""
+    own_kind: type[Analysis] | None = None  # in place of that of the entry
     unsupported: tuple[str, ...] = ()  # options that the page does not offer
     outcome: AnalysisOutcome | None = None
     problem: tuple[ResultKey, str] | None = None
@@ -100,7 +89,7 @@ class AnalysisPanel(Section):
     @property
     def kind(self) -> type[Analysis]:
         """The analysis, imported on first use."""
-        return self.entry.load()
+        return self.own_kind or self.entry.load()
 
     # --- what a subclass may override ------------------------------------------------------------
 
@@ -166,9 +155,7 @@ class AnalysisPanel(Section):
         return result_html(block for block in result.blocks() if not isinstance(block, str))
 
     def actions(self, result: Result, *, stale: bool) -> Markup:
-        saves = [button(f"Save {end}", do.SaveResult(self.name, end)) for end in _endings(result)]
-        saves.append(button("Add to report", do.AddToReport(self.name), kind="quiet"))
-        return actions(*saves)
+        return HTML.buttons(self.name, _endings(result))
 
     # --- the page --------------------------------------------------------------------------------
 
@@ -181,7 +168,7 @@ class AnalysisPanel(Section):
 
     def body(self, picture: LivePicture) -> Markup:
         words = compare.present_words(picture)
-        remark = tag("p", words, class_="ws-tiny") if words else EMPTY
+        remark = tiny(words) if words else EMPTY
         return remark + self._body(picture.state)
 
     def _body(self, state: AppState) -> Markup:
@@ -190,66 +177,43 @@ class AnalysisPanel(Section):
         if is_automatic and is_ready:
             self.run_if_stale(state)
         stale = outcome is not None and outcome.key != key
-        problem = self.problem_html(state)
-        parts: list[object] = [self.before_result(state), problem]
-        if outcome is not None and not problem:
-            if key == self._applied_key:
-                text = "Applied to the displayed machine. Undo reverts it."
-                parts += [tag("p", text, role="status"), RECORD]
-            elif stale and not is_automatic:
-                text = "Out of date: inputs have changed. Run again."
-                parts.append(tag("p", text, class_="ws-stale"))
-            result, faded = outcome.result, stale and key != self._applied_key
-            content = join((self.headline(result), self.cards_html(key), self.result_html(result)))
-            parts.append(tag("div", content, class_="ws-result" + (" stale" if faded else "")))
-            parts += [tag("p", caveat, class_="ws-caveat") for caveat in result.caveats()]
-            parts.append(self.actions(result, stale=stale))
-        bar = EMPTY if stale and is_automatic else self._jobs.html()
-        needs_run = outcome is None or problem or (stale and not is_automatic)
-        if needs_run and is_ready and not bar:
-            label = f"{self.run_label} again" if outcome else self.run_label
-            run = button(label, do.Run(self.name), kind="" if outcome else "main",
-                         hint=self.run_hint)  # fmt: skip
-            bar = tag("div", run, class_="ws-actions ws-run")
-        parts.append(bar)
-        return join((*parts, self.options_html(state)))
+        parts = {"inputs": self.before_result(state), "problem": self.problem_html(state)}
+        if outcome is not None and not parts["problem"]:
+            result = outcome.result
+            parts["result"] = join(
+                (self.headline(result), self.cards_html(key), self.result_html(result))
+            )
+            parts["actions"] = self.actions(result, stale=stale)
+        parts["progress"] = EMPTY if stale and is_automatic else self._jobs.html()
+        parts["options"] = self.options_html(state)
+        is_missing = outcome is None or parts["problem"] or (stale and not is_automatic)
+        needs_run = is_missing and is_ready and not parts["progress"]
+        is_applied = key == self._applied_key
+        return HTML.analysis(self, outcome, parts, stale, is_applied, is_automatic, needs_run)
 
     def problem_html(self, state: AppState) -> Markup:
         key, text = self.problem or ((), "")
         return alert(text) if key == self.result_key(state) else EMPTY
 
     def cards_html(self, key: ResultKey) -> Markup:
-        outcome, cards = self.outcome, list[Markup]()
-        if outcome is None:
-            return EMPTY
-        if key == self._applied_key != outcome.key:
+        outcome = self.outcome
+        if outcome is None or key == self._applied_key != outcome.key:
             return EMPTY  # applied, not offered again
-        hints = {do.Preview: "Compare the result with the current state",
-                 do.Apply: "Change the errors; the current state becomes A"}  # fmt: skip
-        for index in self.offered_changes(outcome.result):
-            buttons = (
-                button(kind.__name__, kind(self.name, index), hint=hint,
-                       kind="main" if kind is do.Apply else "", disabled=outcome.key != key)
-                for kind, hint in hints.items()
-            )  # fmt: skip
-            cards.append(tag("div", outcome.cards[index][1] + actions(*buttons), class_="ws-card"))
-        return join(cards)
+        cards = [(n, outcome.cards[n][1]) for n in self.offered_changes(outcome.result)]
+        return HTML.cards(self.name, cards, outcome.key == key)
 
     def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
-        options = [option for option in self.shown_options(state) if option.name not in OF_STATE]
-        if "limit_um" in {option.name for option in self.shown_options(state)}:
-            controls = quiet(f"{limit_words(state)}: see the heading.") + controls
-        if not options and not controls:
+        options, values = self.shown_options(state), self.values(state)
+        limit = limit_words(state) if any(o.name == "limit_um" for o in options) else ""
+        lines = [
+            (o, values.get(o.name), _titles(o, state.scene), _example(o))
+            for o in options
+            if o.name not in OF_STATE
+        ]
+        if not (lines or controls or limit):
             return EMPTY
-        values = self.values(state)
-        form = controls + join(
-            _control(
-                do.SetOption(self.name, option.name), option, values.get(option.name), state.scene
-            )
-            for option in options
-        )
-        is_open, key = bool(self.problem_html(state)), f"{self.name}.options"
-        return details("Options", form, open=is_open, data_key=key)
+        is_open = bool(self.problem_html(state))
+        return HTML.options(self.name, limit, controls, lines, is_open)
 
     # --- actions -------------------------------------------------------------------------------
 
@@ -327,13 +291,16 @@ class AnalysisPanel(Section):
         else:
             self._run(state)
 
-    def _run_job(self, name: str, compute: Callable[[Job], T], accept: Callable[[T], None]) -> None:
+    def _run_job(
+        self, name: str, compute: Callable[[Job], T], accept: Callable[[T], None],
+        jobs: Jobs | None = None,
+    ) -> None:  # fmt: skip
         def work(job: Job) -> None:
             product = compute(job)
             if not job.is_set():
                 self.context.call_soon(partial(accept, product))
 
-        self._jobs.start(name, work)
+        (jobs or self._jobs).start(name, work)
 
     def _accept_outcome(self, outcome: AnalysisOutcome) -> None:
         self.outcome, self.problem = outcome, None
@@ -381,43 +348,27 @@ def _change_html(state: AppState, change: Change) -> Markup:
     for key in {**before_state.amplitudes, **after_state.amplitudes}:
         a, b = (state.amplitudes.get(key, 0.0) for state in (before_state, after_state))
         if abs(b - a) > SAME:
-            line = f"{key} {html.number(a)} → {html.number(b)} {parameter(key).unit}"
+            line = f"{key} {number(a)} → {number(b)} {parameter(key).unit}"
             moved.append((-abs(b - a), line))
     steps = [line for _, line in sorted(moved)] or [change.label]
-    lines = [tag("div", tag("b", line)) for line in steps[:MOST_STEPS]]
-    n_hidden = len(steps) - MOST_STEPS
-    if n_hidden > 0:
-        lines.append(tag("div", f"and {n_hidden} more", class_="ws-quiet"))
     try:
         before, after = (PLAIN.evaluate(state).statistics for state in (before_state, after_state))
     except WarpspaceError:
-        return join(lines)
-    numbers = {"max": "max_um", "mean": "mean_um", "RMS": "rms_um"}
-    pairs = ((name, getattr(before, at), getattr(after, at)) for name, at in numbers.items())
-    return join(lines) + html.rows(
-        (name, f"{html.number(a)} → {html.number(b)} µm") for name, a, b in pairs
-    )
+        return HTML.change(steps, MOST_STEPS)
+    return HTML.change(steps, MOST_STEPS, before, after)
 
 
-def _control(name: do.SetOption, option: Option, text: str | None, scene: Scene) -> Markup:
-    hint, default = f"{option.about}.", option.default_words
-    metavar = option.grammar and option.grammar.metavar
-    if option.kind is bool:
-        return html.switch(
-            name, option.label, hint=hint, on=(text or str(int(option.default))) == "1"
-        )
-    if option.choices or metavar == "AXIS":
-        keys = option.choices or tuple(scene.machine.axes)
-        titles = {key: option.choice_labels.get(key, re.sub("[_-]", " ", key)) for key in keys}
-        if not option.default:
-            titles = {UNSET: default or "automatic", **titles}
-        control = html.choice(name, str(option.default or UNSET) if text is None else text, titles)
-        return field(option.label, control, name, option.unit, hint)
-    if option.low is not None and option.high is not None:
-        hint += f" Range: {option.low:g} to {option.high:g}"
-    initial = "" if metavar or option.unset else default
-    control = text_box(
-        name, initial if text is None else text, size="" if metavar else "short",
-        placeholder=default or EXAMPLES.get(metavar or "", metavar or ""),
-    )  # fmt: skip
-    return field(option.label, control, name, option.unit, hint)
+def _example(option: Option) -> str:
+    """Return an example of the notation of an option; empty for numbers."""
+    metavar = option.grammar.metavar if option.grammar else ""
+    return EXAMPLES.get(metavar, metavar)
+
+
+def _titles(option: Option, scene: Scene) -> dict[str, str]:
+    """Return the labels of the values that can be chosen; empty for a text box."""
+    of_axis = option.grammar is not None and option.grammar.metavar == "AXIS"
+    keys = option.choices or (scene.machine.axes if of_axis else ())
+    titles = {key: option.choice_labels.get(key, re.sub("[_-]", " ", key)) for key in keys}
+    if option.default or not titles:
+        return titles
+    return {"": option.default_words or "automatic", **titles}  # chosen by the analysis

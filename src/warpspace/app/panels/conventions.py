@@ -5,37 +5,27 @@ follow them; `AppState.origin` holds those of the scene.
 """
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import replace
-from itertools import chain
 
-import numpy as np
 from markupsafe import Markup
 
+from warpspace.analysis.convention_costs import Effect, convention_costs, measure_change
 from warpspace.app.browser import actions as do
-from warpspace.app.browser.html import EMPTY, button, field, fill, join, number, tag, text_box
+from warpspace.app.browser.templates import Templates
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.panel import Section, actions, details, on, tiny
+from warpspace.app.panels.panel import Section, on
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import linear_spans
 from warpspace.app.state.tree import EXAMPLE
 from warpspace.app.state.typed_numbers import read_positions
-from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import View, evaluate_first_order
 from warpspace.field.grid import build_grid
-from warpspace.kinematics import conversion, transforms
-from warpspace.kinematics.chain import branch_frames, nominal_point
-from warpspace.kinematics.model import Loop, Model, convention_names, find_convention
-from warpspace.machine.axes import TravelDirection, is_linear, parameter
-from warpspace.machine.definition import Vector
-from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, Poly
+from warpspace.kinematics.model import Model, convention_names, find_convention
+from warpspace.machine.axes import TravelDirection, is_linear
 from warpspace.scene.model import Scene, evaluate_grid
-from warpspace.scene.scene_writer import covered_spans
 from warpspace.units import Array
 
-Effect = tuple[float, float]
-"""Mean over the volume and largest length of the change of the error vector, µm."""
+HTML = Templates("conventions")
 
 
 def with_travel(state: AppState, direction: str) -> AppState:
@@ -144,10 +134,10 @@ def effects_of(state: AppState) -> dict[str, Effect]:
     if state.scene.reference is not None:
         variants["reference=point"] = with_reference(base, state.scene.reference)
     (weights, before), in_force = _error(base), chosen(base.scene)
-    return {
-        choice: (0.0, 0.0) if choice in in_force else _effect(weights, _error(variant)[1] - before)
-        for choice, variant in variants.items()
-    }
+    effects = dict.fromkeys(in_force, (0.0, 0.0))
+    for choice in variants.keys() - in_force:
+        effects[choice] = measure_change(weights, _error(variants[choice])[1] - before)
+    return effects
 
 
 def _error(state: AppState) -> tuple[Array, Array]:
@@ -155,97 +145,7 @@ def _error(state: AppState) -> tuple[Array, Array]:
     return grid.weights, evaluate_grid(state.active_scene(), grid, state.view()).error_um
 
 
-def _effect(weights: Array, change_um: Array) -> Effect:
-    length = np.linalg.norm(change_um, axis=-1)
-    return float(np.sum(weights * length)), float(length.max())
-
-
-# --- Effect of reading measured errors in a wrong convention --------------------------------------
-
-
-def convention_costs(scene: Scene, view: View, nodes: int = 21) -> dict[str, Effect]:
-    """Compute the effect of each wrong convention over the working volume, to first order.
-
-    The same numbers are read in the convention of the scene and in another one. Those that cannot
-    be converted are omitted.
-    """
-    grid = build_grid(scene.model, scene.workspace, nodes)
-
-    def field_of(errors: ErrorSet, direction: str = scene.model.direction) -> Array:
-        at = grid.coordinates, view, grid.point_mm
-        return evaluate_first_order(replace(scene.model, direction=direction), errors, *at).error_um
-
-    nominal_field = field_of(scene.errors)
-    field_changes = {
-        name: field_of(ErrorSet(changes), TravelDirection.MEAN)
-        for name, changes in _changes(scene).items()
-    }
-    for sign in conversion.SquarenessSign:
-        read = conversion.convert_squareness(scene.machine, scene.errors, sign)
-        field_changes[f"squareness={sign}"] = field_of(read) - nominal_field
-    with suppress(OptionError):
-        field_changes["measuring_line"] = field_of(_measured_in_the_middle(scene)) - nominal_field
-    return {name: _effect(grid.weights, change) for name, change in field_changes.items()}
-
-
-def _changes(scene: Scene) -> dict[str, dict[str, ErrorFunction]]:
-    """Return the changes of curves whose reference line or mid-axis value is subtracted."""
-    errors, axes = scene.errors, scene.machine.axes
-    middle = {axis: np.asarray(at) for axis, at in scene.workspace.positions.items()}
-    changes = {
-        name: dict[str, ErrorFunction]()
-        for name in ("zero_at", *map(str, conversion.ReferenceLine))
-    }
-    for row in map(parameter, errors):
-        axis, span = axes[row.axis], scene.axis_span(row.axis)
-        if not row.is_constant:
-            value_in_middle = errors.evaluate_at(row.key, middle, scene.model.direction)
-            changes["zero_at"][row.key] = Constant(span, -float(value_in_middle))
-            if axis.is_linear and not row.is_rotation and row.direction != axis.index:
-                axis_errors = conversion.AxisErrors(scene.model, errors, row.axis, span)
-                at = axis_errors.line_positions(row.key)
-                for line in conversion.ReferenceLine:
-                    offset, slope = conversion.fit_line(at, errors.evaluate(row.key, at), line)
-                    changes[line][row.key] = Poly(span, (-offset, -slope))
-    return changes
-
-
-def _measured_in_the_middle(scene: Scene) -> ErrorSet:
-    """Convert translations measured along lines through the centre of the volume."""
-    model = scene.model
-    middle = {axis: np.asarray(at) for axis, at in scene.workspace.positions.items()}
-    point = nominal_point(model, Loop.TOOL, middle)
-    lines: dict[str, Vector] = {}
-    branches = (branch_frames(model, branch, middle) for branch in ("tool", "workpiece"))
-    for frames in chain(*branches):
-        if frames.axis.is_linear:
-            x, y, z = transforms.apply(transforms.inverse(frames.after), point).tolist()
-            lines[frames.axis.name] = (x, y, z)
-    spans = covered_spans(model, scene.workspace)
-    return conversion.move_measuring_line(model, scene.errors, spans, lines, to_origin=True)
-
-
 # --- The section ----------------------------------------------------------------------------------
-
-COSTS = {
-    "squareness=over_90": "squareness: positive if the angle exceeds 90°",
-    "squareness=under_90": "squareness: positive if the angle is below 90°",
-    "measuring_line": "measuring line: through the centre of the volume",
-    "end_point": "straightness: end-point line subtracted",
-    "least_squares": "straightness: least-squares line subtracted",
-    "minimum_zone": "straightness: minimum-zone line subtracted",
-    "zero_at": "curves: zero at the middle of each axis",
-}
-NOTE = (
-    "Change of the error vector over the grid nodes, for the displayed loop: each choice alone,"
-    " relative to the conventions of the scene."
-)
-RADIO = '<label><input type="radio" name="{}" value="{}"{} data-set="{}"> {}</label>'
-COST_NOTE = (
-    "First-order effect of a wrong assumption about the measured data. The scene assumes squareness"
-    " by the right-hand rule, measuring lines through the origin of each axis, straightness"
-    " including tilt, and curves without offset removal."
-)
 
 
 class ConventionsSection(Section):
@@ -264,29 +164,16 @@ class ConventionsSection(Section):
         state = picture.state
         effects, in_force = effects_of(state), chosen(state.scene)
         scene_choices = chosen(with_own_conventions(state).scene)
-        lines = [fill("<tr><th>µm</th><th class=number>mean</th><th class=number>max</th></tr>")]
-        for head, members in choice_groups(state.scene).items():
-            lines.append(fill('<tr><th colspan="3"><b>{}</b> {}</th></tr>', *head))
-            for choice, label in members.items():
-                checked = Markup(" checked") if choice in in_force else ""
-                title = f"{label} (scene)" if choice in scene_choices else label
-                radio = fill(
-                    RADIO,
-                    choice.partition("=")[0],
-                    choice,
-                    checked,
-                    do.Input.CHOOSE_CONVENTION(),
-                    title,
-                )
-                lines.append(_row(radio, None if choice in scene_choices else effects[choice]))
-        lines.append(_row("all choices together", effects["all"]))
-        reset = button(
-            "Reset to the scene", do.Signal.RESET_CONVENTIONS, disabled=in_force == scene_choices
+        scene, reference = state.active_scene(), ""
+        costs = convention_costs(scene, scene.view(state.loop), state.nodes)
+        if scene.reference is not None:
+            at = {**scene.workspace.positions, **scene.reference}
+            reference = " ".join(f"{axis} {at[axis]:g}" for axis in linear_spans(scene))
+        has_point = state.picked is not None and state.picked.point_mm is None
+        groups = choice_groups(scene)
+        return HTML.conventions(
+            groups, in_force, scene_choices, effects, reference, has_point, costs
         )
-        return join((
-            tag("table", join(lines), class_="ws-choices-table"), tiny(NOTE),
-            _reference(state), actions(reset), _wrong(state),
-        ))  # fmt: skip
 
     @on(do.Input.CHOOSE_CONVENTION)
     def choose(self, state: AppState, choice: str) -> AppState:
@@ -307,31 +194,3 @@ class ConventionsSection(Section):
             return with_reference(state, at)
         expected = f"expected axis positions, for example {EXAMPLE}"
         return state.noted(f"point {text[:40]!r}: {expected}")
-
-
-def _reference(state: AppState) -> Markup:
-    if state.scene.reference is None:
-        return EMPTY
-    positions = {**state.scene.workspace.positions, **state.scene.reference}
-    text = " ".join(f"{axis} {positions[axis]:g}" for axis in linear_spans(state.scene))
-    name, hint = do.Input.SET_REFERENCE(), "First click a point of the volume"
-    box = field("Reference point", text_box(name, text), name, hint="Axis positions")
-    nowhere = state.picked is None or state.picked.point_mm is not None
-    pick = button(
-        "Use the clicked point", do.Signal.USE_PICKED_REFERENCE, hint=hint, disabled=nowhere
-    )
-    return box + actions(pick)
-
-
-def _row(label: object, effect: Effect | None) -> Markup:
-    cells = ("–", "–") if effect is None else map(number, effect)
-    line = '<tr><td>{}</td><td class="number">{}</td><td class="number">{}</td></tr>'
-    return fill(line, label, *cells)
-
-
-def _wrong(state: AppState) -> Markup:
-    scene = state.active_scene()
-    costs = convention_costs(scene, scene.view(state.loop), state.nodes)
-    rows = [_row(label, costs.get(name)) for name, label in COSTS.items()]
-    heading = "Effect of data measured in another convention"
-    return details(heading, tiny(COST_NOTE), tag("table", join(rows)))

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from string import ascii_uppercase
 from typing import Any
 
 import numpy as np
@@ -14,33 +13,31 @@ from warpspace.analysis.description import Result
 from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.options import Option, read_numbers
 from warpspace.analysis.sampling.cases import Case, Reduction, SamplingPlan
-from warpspace.analysis.sampling.distribution import Distribution, Draws, Probability, Stream
+from warpspace.analysis.sampling.distribution import Distribution, Draws
 from warpspace.analysis.sampling.tolerance_search import Ensemble, build_ensemble
 from warpspace.analysis.sampling.worst_case import worst_case_um
 from warpspace.app.browser import actions as do
-from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button, fill, join, number, tag
+from warpspace.app.browser.html import EMPTY, join
+from warpspace.app.browser.templates import Templates
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.machine_edits import library
 from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import histogram_html
-from warpspace.app.panels.panel import alert, on, quiet, setting, tiny
+from warpspace.app.panels.panel import alert, on, setting
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.leaf import Identity
-from warpspace.app.state.typed_numbers import spell_typed
 from warpspace.exceptions import WarpspaceError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
-from warpspace.machine.errors import Tolerance, ToleranceSet
 from warpspace.machine.limits import MOST_CONCEPTS
 from warpspace.scene.model import Scene
-from warpspace.units import Array, spell_count
+from warpspace.units import spell_count
 
+HTML = Templates("design")
 SAMPLES = 20_000  # machines per probability on the page
 ENSEMBLES: Cache[Ensemble] = Cache(100_000_000)
 """Sampled machines before tolerances are applied, for all sessions."""
-WHERE = {"max": "everywhere", "sampled": "at a random point"}
 SCALES = {"÷ 1.5": 1.0 / 1.5, "−5 %": 0.95, "+5 %": 1.05, "× 1.5": 1.5}
 """Factors for all tolerances, by label."""
 
@@ -108,56 +105,39 @@ class TolerancesPanel(AnalysisPanel):
         return ()  # applied already
 
     def before_result(self, state: AppState) -> Markup:
-        controls = _controls(state, "limit_um", "percent")
+        controls = _settings(state, "limit_um", "percent")
         try:
-            return controls + self._probability(sample_machines(state), state)
+            ensemble = sample_machines(state)
         except WarpspaceError as error:
             return controls + alert(self.spell_error(error))
-
-    def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
-        controls = _controls(state, "over", "distribution", "costs")
-        listed = self._rows(sample_machines(state), state) if _can_sample(state) else EMPTY
-        return listed + super().options_html(state, controls)
-
-    def _probability(self, ensemble: Ensemble, state: AppState) -> Markup:
         specification = state.specification
-        stream, probability = estimate(ensemble, state.tolerances, specification.limit_um)
+        stream = ensemble.estimate(state.tolerances, specification.limit_um)
         histogram = stream.display_histogram()
         chart = Histogram(
             "|E| of the machines", "", "|E| [µm]", "machines", histogram.edges_um,
             histogram.counts.astype(float), limit=specification.limit_um,
         )  # fmt: skip
-        headline = quiet("Set a limit for the share of the machines that meet it.")
-        numbers = (
-            f"mean {number(stream.mean_um)} · P95 {number(stream.quantile(0.95))} ·"
-            f" largest {number(stream.max_um)} µm; {spell_count(stream.count)} machines"
-        )
-        if probability is not None:
-            headline = fill(
-                '<p class="ws-headline"><span class="{kind}">{share} %</span> of the machines stay'
-                " within {limit} µm {where}</p>",
-                kind="ws-pass" if probability.low >= specification.percent / 100.0 else "ws-fail",
-                share=percent(probability.probability), limit=f"{specification.limit_um:g}",
-                where=WHERE[specification.over],
-            )  # fmt: skip
-            low, high = percent(probability.low), percent(probability.high)
-            numbers += f", 95 % confidence {low} … {high} %"
-        return headline + histogram_html(chart) + tiny(numbers)
+        return HTML.probability(
+            controls, specification, stream, stream.probability(), histogram_html(chart), percent,
+            spell_count(stream.count),
+        )  # fmt: skip
 
-    def _rows(self, ensemble: Ensemble, state: AppState) -> Markup:
-        shares = tolerance_shares(ensemble, state.tolerances)
+    def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
+        options = super().options_html(state, _settings(state, "over", "distribution", "costs"))
+        if not _can_sample(state):
+            return options
+        ensemble = sample_machines(state)
+        shares = ensemble.variance_shares(state.tolerances)
         order_key: ResultKey = (Identity(state.origin), ensemble.keys)
         if self._order[0] != order_key:  # rows must not move during a drag
             self._order = order_key, tuple(sorted(shares, key=lambda key: -shares[key]))
+        widths = {key: edits.half_width_of(state, key) for key in self._order[1]}
+        lines = [
+            (parameter(key), width, edits.half_width_span(state, key), shares[key])
+            for key, width in widths.items()
+        ]
         longest = max(shares.values(), default=0.0) or 1.0
-        tolerance_rows = join(_row(state, key, shares[key], longest) for key in self._order[1])
-        hint = "Scale all tolerances except fixed ones"
-        scales = join(
-            button(label, do.Input.SCALE_TOLERANCES(label), hint=hint) for label in SCALES
-        ) + button("As in the scene", do.Signal.RESET_TOLERANCES, kind="quiet")
-        return tag("h4", "Half-widths and shares of the variance") + tolerance_rows + tag(
-            "div", scales, class_="ws-actions", role="group", aria_label="Scale all tolerances"
-        )  # fmt: skip
+        return HTML.tolerances(lines, longest, state.specification.fixed, SCALES) + options
 
     @on(do.Input.SCALE_TOLERANCES)
     def scale(self, state: AppState, label: str) -> AppState | None:
@@ -171,32 +151,8 @@ class TolerancesPanel(AnalysisPanel):
         return edits.with_scene_tolerances(state)
 
 
-def _controls(state: AppState, *names: str) -> Markup:
+def _settings(state: AppState, *names: str) -> Markup:
     return join(setting(state, f"specification.{name}") for name in names)
-
-
-def _row(state: AppState, key: str, share: float, longest: float) -> Markup:
-    row, span = parameter(key), edits.half_width_span(state, key)
-    width, is_fixed = edits.half_width_of(state, key), key in state.specification.fixed
-    name = do.SetLeaf(f"tolerances.{key}")
-    return fill(
-        '<div class="ws-tolerance" data-key="tolerances.{code}"><div>'
-        "<span><b>{code}</b> {words}</span><span>{share} %</span></div>"
-        '<div class="ws-effect"><i style="width:{length}%"></i></div>'
-        '<div class="ws-error-set">{slider}±{box}<span class="ws-unit">'
-        "{unit}</span>{fixed}</div></div>",
-        code=key, words=row.name, share=number(100.0 * share),
-        length=f"{100.0 * share / longest:.1f}", unit=row.unit,
-        slider=html.slider(name, width, span.low, span.high, span.step, twin=name,
-                      label=f"Half-width of {key}", text=f"±{width:g} {row.unit}"),
-        box=html.text_box(name, spell_typed(width), label=f"Half-width of {key} in {row.unit}",
-                     size="short", inputmode="decimal"),
-        fixed=button("fixed" if is_fixed else "fix",
-                     do.SetLeaf("specification.fixed", f"{'-' if is_fixed else '+'}{key}"),
-                     kind="link", pressed=is_fixed,
-                     aria_label=f"Fix the tolerance of {key}",
-                     hint="A fixed tolerance is neither allocated nor scaled"),
-    )  # fmt: skip
 
 
 def _sampled(state: AppState) -> ResultKey:
@@ -231,47 +187,19 @@ def allowed_words(state: AppState) -> Markup:
     if not _can_sample(state):
         return EMPTY
     ensemble = sample_machines(state)
-    ranges = _centres_and_widths(ensemble, state.tolerances)
+    ranges = ensemble.ranges(state.tolerances)
     largest = float(ensemble.norm_um(*ranges).max())
     if not largest:
         return EMPTY
-    worst = ""
+    worst_um = None
     if ensemble.spread is None:  # all machines at the same points
         worst_um = worst_case_um(ensemble.gains.astype(float), *ranges)
-        worst = f", {number(worst_um)} µm worst case"
-    hint = f"Largest error of {spell_count(len(ensemble.unit))} sampled machines within tolerance"
-    if worst:
-        hint += ", and of the worst combination of errors within tolerance"
-    return tag("span", f"tolerances: {number(largest)} µm sampled{worst}", title=hint)
-
-
-def _centres_and_widths(ensemble: Ensemble, tolerances: ToleranceSet) -> Array:
-    zero = Tolerance(0.0, 0.0)
-    ranges = [tolerances.get(key) or zero for key in ensemble.keys]
-    return np.array([[t.centre for t in ranges], [t.half_width for t in ranges]])
-
-
-def estimate(
-    ensemble: Ensemble, tolerances: ToleranceSet, limit_um: float | None
-) -> tuple[Stream, Probability | None]:
-    """Evaluate the machines of a tolerance set, and the probability of meeting a limit."""
-    norm_um = ensemble.norm_um(*_centres_and_widths(ensemble, tolerances))
-    stream = Stream(len(norm_um), limit_um)
-    stream.add(norm_um)
-    return stream, stream.probability()
-
-
-def tolerance_shares(ensemble: Ensemble, tolerances: ToleranceSet) -> dict[str, float]:
-    _, half_widths = _centres_and_widths(ensemble, tolerances)
-    variances = half_widths**2 * ensemble.mean_square_gain
-    shares = variances / (float(variances.sum()) or 1.0)
-    return dict(zip(ensemble.keys, shares.tolist(), strict=True))
+    return HTML.allowed(largest, worst_um, spell_count(len(ensemble.unit)))
 
 
 # --- Concepts -------------------------------------------------------------------------------------
 
 PRESENT = "the present machine"  # the edited one, among the compared machines
-ADD = "Compare with …"
 
 
 class ConceptsPanel(AnalysisPanel):
@@ -314,31 +242,15 @@ class ConceptsPanel(AnalysisPanel):
         )  # fmt: skip
 
     def before_result(self, state: AppState) -> Markup:
-        offers, lines = self.offers(state), list[tuple[Markup, Markup]]()
+        offers = self.offers(state)
         chosen = [key for key in self.chosen(state) if key in offers]
-        for letter, key in zip(ascii_uppercase, chosen, strict=False):
-            open_button = button("Open", do.Input.OPEN_CONCEPT(key), kind="link",
-                                 hint="Open this machine", aria_label=f"Open {key}")  # fmt: skip
-            remove_button = button("✕", do.Input.REMOVE_CONCEPT(key), kind="link", hint="Remove",
-                             aria_label=f"Remove {key}")  # fmt: skip
-            if key == PRESENT:
-                title, buttons = state.scene.title, remove_button
-            else:
-                title, buttons = key, open_button + remove_button
-            lines.append((tag("b", f"{letter} ") + title, buttons))
-        remaining = {key: key for key in offers if key not in chosen}
-        add = html.choice(do.Input.ADD_CONCEPT(), "", {"": ADD, **remaining},
-                     label="Compare with another machine")  # fmt: skip
-        machines = html.rows(lines) if self.is_ready(state) else EMPTY
-        return (add if len(chosen) < MOST_CONCEPTS else EMPTY) + machines
+        remaining = {"": "Compare with …", **{key: key for key in offers if key not in chosen}}
+        return HTML.machines(PRESENT, state.scene.title, chosen, remaining, MOST_CONCEPTS)
 
     def actions(self, result: Result, *, stale: bool) -> Markup:
         """Render the buttons below a result, the picture for a review first."""
         draws = self.context.services.draw_concepts is not None
-        sheet = (button("Picture", do.Signal.DRAW_CONCEPTS, kind="main", disabled=stale,
-                        hint="One sheet with all machines at the same scale, with their statistics")
-                 if draws else EMPTY)  # fmt: skip
-        return sheet + super().actions(result, stale=stale)
+        return (HTML.sheet(stale) if draws else EMPTY) + super().actions(result, stale=stale)
 
     @on(do.Input.ADD_CONCEPT)
     def add(self, state: AppState, title: str) -> AppState | None:

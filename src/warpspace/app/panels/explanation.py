@@ -1,5 +1,6 @@
 """Contributions to the error of a point, distances between points, and volume statistics."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +11,8 @@ from warpspace.analysis.commands.contributions import PointContribution
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.analysis.uncertainty.propagation import NAMES
 from warpspace.app.browser import actions as do
-from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button, join, number, rows, signed, tag
+from warpspace.app.browser.html import EMPTY, join, number
+from warpspace.app.browser.templates import Templates
 from warpspace.app.drawing.camera import fit_camera
 from warpspace.app.evaluation import point_explanation
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -23,7 +24,7 @@ from warpspace.app.evaluation.point_explanation import (
 )
 from warpspace.app.panels.analysis_panel import AnalysisPanel
 from warpspace.app.panels.block_html import block_html
-from warpspace.app.panels.panel import Section, actions, details, on, quiet, tiny
+from warpspace.app.panels.panel import Section, on, quiet, tiny
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.tree import EXAMPLE
 from warpspace.field.evaluate import placed_words
@@ -35,10 +36,7 @@ from warpspace.units import spell_count
 
 FIRST = 3  # contributions listed at first; Details lists all
 DIFFERENCE = "Contributions are not available for the difference B − A: show A or B."
-ELSEWHERE = (
-    "The largest contribution at this point may compensate others elsewhere in the volume; it is"
-    " not necessarily the error to adjust."
-)
+HTML = Templates("explanation")
 
 
 class WorstPanel(Section):
@@ -63,20 +61,14 @@ class WorstPanel(Section):
             return quiet(DIFFERENCE)
         if self._is_nominal(picture):
             return quiet("No errors: every point is at its nominal position.")
-        explanation, controls = self._explain(picture), EMPTY
-        if picture.state.picked is not None:
-            reset = button("Worst point", do.Signal.FORGET_POINT, kind="link",
-                          hint="Return to the worst point")  # fmt: skip
-            hint = "Pin a note to this point (N)"
-            pin = button("Pin a note", do.Input.PIN_NOTE(), kind="link", hint=hint)
-            controls = tag("p", join((_axes(explanation), " ", reset, " ", pin)))
-        best = tag("div", "", data_piece="best")
-        limit = picture.state.specification.limit_um
-        table = _details(explanation, picture.state.lever)
-        return join((
-            controls, _contributions(explanation), _uncertainty(explanation, limit), best,
-            details("Details", table, kind="details", data_key="worst.details"),
-        ))  # fmt: skip
+        explanation, state = self._explain(picture), picture.state
+        at = "" if state.picked is None else _spelt(explanation.at)
+        residual_um = None
+        if explanation.is_corrected:
+            residual_um = float(np.linalg.norm(explanation.drawn_um))
+        uncertainty = _uncertainty(explanation, state.specification.limit_um)
+        details = _details(explanation, state.lever)
+        return HTML.worst(explanation, at, FIRST, parameter, residual_um, uncertainty, details)
 
     def _is_nominal(self, picture: LivePicture) -> bool:
         return picture.state.picked is None and not picture.field.error_um.any()
@@ -119,28 +111,8 @@ class WorstPanel(Section):
             self.context.move_camera(pose)
 
 
-def _axes(explanation: PointExplanation) -> str:
-    return formatting.spell_axes(explanation.at).removeprefix("axes ")
-
-
-def _contributions(explanation: PointExplanation) -> Markup:
-    largest, n_others = explanation.ranked[:FIRST], len(explanation.ranked[FIRST:])
-    remainder_um = explanation.length_um - sum(c.along_um for c in largest)
-    lines: list[tuple[Markup, str]] = []
-    for contribution in largest:
-        along = signed(contribution.along_um)
-        hint = f"{parameter(contribution.key).name}: {along} µm"
-        lines.append((tag("b", contribution.key, title=hint), along))
-    if n_others or abs(remainder_um) >= 0.05:
-        label = f"{n_others} more" if n_others else "second order"
-        lines.append((tag("span", label, class_="ws-quiet"), signed(remainder_um)))
-    if not lines:
-        return quiet("No error acts at this point.")
-    note = EMPTY
-    if explanation.is_corrected:
-        residual = number(float(np.linalg.norm(explanation.drawn_um)))
-        note = tag("p", f"Residual error after compensation: {residual} µm, as displayed.")
-    return rows(lines, "ws-rows ws-causes") + note
+def _spelt(positions: Mapping[str, float]) -> str:
+    return formatting.spell_axes(positions).removeprefix("axes ")
 
 
 def _uncertainty(explanation: PointExplanation, limit_um: float | None) -> Markup:
@@ -149,31 +121,25 @@ def _uncertainty(explanation: PointExplanation, limit_um: float | None) -> Marku
     Negative correlations give negative shares; all shares add up to 100 %.
     """
     uncertainty = explanation.uncertainty
-    if uncertainty is None or not uncertainty.errors.is_known:
-        remarks = [] if uncertainty is None else uncertainty.errors.remarks()
-        return join(tiny(remark) for remark in remarks)
+    if uncertainty is None:
+        return EMPTY
+    if not uncertainty.errors.is_known:
+        return join(map(tiny, uncertainty.errors.remarks()))
     variances = uncertainty.variance_shares(uncertainty.response @ uncertainty.direction)
     shares = [(key, f"{number(100.0 * share, 0)} %") for key, share in variances.items()]
     shares = [(key, share) for key, share in shares if share != "0 %"]
-    largest = ", ".join(f"{key} {share}" for key, share in shares[:FIRST])
-    text = f"U95{length_words(uncertainty)} µm; variance shares: {largest}"
+    probability = None
     if limit_um is not None:
-        probability = number(100.0 * float(uncertainty.conformance_probability(limit_um)), 1)
-        text = f"|E| ≤ {limit_um:g} µm with a probability of {probability} %. {text}"
-    if len(shares) <= FIRST:
-        return tiny(text)
-    table = rows(shares[FIRST:])
-    return tiny(text) + details("All shares", table, kind="details", data_key="worst.shares")
+        probability = 100.0 * float(uncertainty.conformance_probability(limit_um))
+    return HTML.uncertainty(length_words(uncertainty), shares, FIRST, limit_um, probability)
 
 
 def _details(explanation: PointExplanation, lever: str) -> Markup:
     point, ranked = explanation.explanation, explanation.ranked
     lines: list[tuple[object, ...]] = [
-        (button(c.key, do.Input.SHOW_LEVER_OF(c.key), kind="link", pressed=c.key == lever,
-                hint=f"{parameter(c.key).name}: draw its axis and lever arm"),
-         c.along_um, *c.error_um)
+        (HTML.axis_lever(c.key, parameter(c.key), c.key == lever), c.along_um, *c.error_um)
         for c in ranked
-    ]  # fmt: skip
+    ]
     lines.append(("second order", None, *point.remainder_um))
     lines.append(("sum", explanation.length_um, *point.error_um))
     columns = (Column("µm"), *number_columns(("along E", "x", "y", "z"), "+z.1f"))
@@ -181,29 +147,18 @@ def _details(explanation: PointExplanation, lever: str) -> Markup:
         "\t".join((c.key, f"{c.along_um:.3f}", *(f"{v:.3f}" for v in c.error_um))) for c in ranked
     )
     place = formatting.spell_in_r(point.nominal_mm + explanation.shift_mm)
-    tilt = number(float(np.linalg.norm(point.orientation_urad)))
-    loop = formatting.LOOP_WORDS[explanation.loop]
-    box = html.text_box(do.SetLeaf("picked"), _axes(explanation), placeholder=EXAMPLE)
-    return tag("div", join((
-        html.field("Point", box, do.SetLeaf("picked"),
-              hint="Axis positions; or click a point of the map or of a trace"),
-        tiny(f"{place} mm · {loop} · tilt {tilt} µrad"),
-        block_html(Table(columns, lines)), *(_lever(c) for c in ranked if c.key == lever),
-        tiny(ELSEWHERE),
-        button("Copy", None, kind="quiet", data_copy=f"key\talong\tx\ty\tz\n{copied}",
-               hint="Copy the table for a spreadsheet"),
-    )))  # fmt: skip
+    tilt, loop = float(np.linalg.norm(point.orientation_urad)), explanation.loop
+    levers = [(c, parameter(c.key), _arm_mm(c)) for c in ranked if c.key == lever]
+    return HTML.details(
+        _spelt(explanation.at), EXAMPLE, place, formatting.LOOP_WORDS[loop], tilt,
+        block_html(Table(columns, lines)), levers, copied,
+    )  # fmt: skip
 
 
-def _lever(contribution: PointContribution) -> Markup:
-    row, effect = parameter(contribution.key), "along the direction shown"
-    if row.is_rotation:
-        arm = float(np.linalg.norm(np.cross(contribution.direction, contribution.lever_mm)))
-        effect = f"× {number(arm, 0)} mm lever arm"
-    show = button("Show the whole lever arm", do.Signal.SHOW_LEVER, kind="link",
-                  hint="Move the camera until axis, lever arm and volume are in view")  # fmt: skip
-    text = f"{contribution.key}: {signed(contribution.value)} {row.unit} {effect} "
-    return tag("p", join((text, show)))
+def _arm_mm(contribution: PointContribution) -> float | None:
+    if not parameter(contribution.key).is_rotation:
+        return None
+    return float(np.linalg.norm(np.cross(contribution.direction, contribution.lever_mm)))
 
 
 class DistancePanel(AnalysisPanel):
@@ -213,18 +168,8 @@ class DistancePanel(AnalysisPanel):
     def before_result(self, state: AppState) -> Markup:
         point, picture = point_explanation.awaited_form(state), self.context.picture
         drawn = picture and point_explanation.measure_distance(picture)
-        hint = "Click two points of the map; a third one gives an angle"
-        buttons = [button("Pick points", do.Signal.PICK_POINTS, kind="main", hint=hint)]
-        if point:
-            buttons = [button("Stop", do.Signal.STOP_PICKING)]
-        if any(map(state.forms.get, POINTS)):
-            buttons.append(button("Clear", do.Signal.CLEAR_POINTS, kind="quiet",
-                                  hint="Remove the points"))  # fmt: skip
-        if drawn:
-            buttons.append(button("Pin", do.Input.PIN_NOTE("\n".join(drawn[0].lines())),
-                                  hint="Pin a note with these numbers"))  # fmt: skip
-        status = tag("p", POINTS[point], role="status") if point else EMPTY
-        return actions(*buttons) + status
+        note = "\n".join(drawn[0].lines()) if drawn else ""
+        return HTML.distance(POINTS.get(point), any(map(state.forms.get, POINTS)), note)
 
     @on(do.Signal.PICK_POINTS)
     def pick(self, state: AppState) -> AppState:
@@ -237,8 +182,7 @@ class DistancePanel(AnalysisPanel):
 
     @on(do.Signal.CLEAR_POINTS)
     def clear(self, state: AppState) -> AppState:
-        forms = {name: text for name, text in state.forms.items() if name not in POINTS}
-        return replace(state, forms=forms)
+        return replace(state, forms={k: v for k, v in state.forms.items() if k not in POINTS})
 
 
 class VolumePanel(Section):
@@ -248,22 +192,19 @@ class VolumePanel(Section):
     sentence = "Mean, RMS, P95 and max of the position error, and of the tilt of the tool axis"
 
     def body(self, picture: LivePicture) -> Markup:
-        statistics, state = picture.statistics, picture.drawn_state
+        statistics, state, grid = picture.statistics, picture.drawn_state, picture.grid
         u95 = {} if picture.uncertainty is None else picture.uncertainty.statistics()
         intervals = {NAMES[key]: formatting.u95_behind(value) for key, value in u95.items()}
-        lines = [(name, f"{number(value)}{intervals.get(name, '')} µm")
-                 for name, value in zip(NAMES.values(), statistics.four, strict=True)]  # fmt: skip
+        values = dict(zip(NAMES.values(), statistics.four, strict=True))
+        tilt = None
         if not picture.is_difference:
             # the picture holds it only if the map is coloured by it
-            errors = evaluate_grid(state.active_scene(), picture.grid, picture.view)
-            tilt = volume_statistics(errors.tilts, picture.grid)
-            lines += [("tilt, mean", f"{number(tilt.mean_um)} µrad"),
-                      ("tilt, max", f"{number(tilt.max_um)} µrad")]  # fmt: skip
-        size = " × ".join(number(float(edge), 0) for edge in picture.grid.extent_mm)
-        lines += [
-            ("nodes", spell_count(picture.field.norm_um.size)),
-            ("volume", f"{size} mm"),
-            ("loop", ", ".join((formatting.LOOP_WORDS[state.loop], *placed_words(state.view())))),
-        ]
-        at = formatting.spell_axes(statistics.max_at_axes).removeprefix("axes ")
-        return rows(lines) + tiny(f"max at {at} · {formatting.spell_in_r(statistics.max_at_mm)} mm")
+            tilt = volume_statistics(
+                evaluate_grid(state.active_scene(), grid, picture.view).tilts, grid
+            )
+        loop = ", ".join((formatting.LOOP_WORDS[state.loop], *placed_words(state.view())))
+        at, at_mm = _spelt(statistics.max_at_axes), formatting.spell_in_r(statistics.max_at_mm)
+        return HTML.volume(
+            values, intervals, tilt, spell_count(picture.field.norm_um.size), grid.extent_mm, loop,
+            at, at_mm,
+        )  # fmt: skip

@@ -6,7 +6,7 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 from markupsafe import Markup
 
@@ -16,12 +16,13 @@ from warpspace.analysis.description import Analysis, Result
 from warpspace.analysis.options import Option
 from warpspace.analysis.registry import entries
 from warpspace.app.browser import actions as do
-from warpspace.app.browser.html import EMPTY, button, choice, join, tag
+from warpspace.app.browser.html import EMPTY
+from warpspace.app.browser.templates import Templates
 from warpspace.app.evaluation.compare import pinned_side, with_before, without_table
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.analysis_panel import RECORD, AnalysisPanel, ResultKey
+from warpspace.app.panels.analysis_panel import AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import details_html, result_html
-from warpspace.app.panels.panel import Context, Refresh, actions, on, quiet
+from warpspace.app.panels.panel import Context, Refresh, on
 from warpspace.app.state.app_state import AppState
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.compensate import Compensation
@@ -29,6 +30,8 @@ from warpspace.formats.compensation.controller import Controller
 from warpspace.formats.registry import find_format, formats
 from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene
+
+HTML = Templates("improve")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,11 +47,7 @@ class AdjustIncluded(Adjust):
 class AdjustPanel(AnalysisPanel):
     """The best sets of adjustments, computed when the task is opened."""
 
-    runs_on_open = True
-
-    @property
-    def kind(self) -> type[Analysis]:
-        return AdjustIncluded
+    runs_on_open, own_kind = True, AdjustIncluded
 
     def options(self) -> Sequence[Option]:
         changes = {"default": None, "choices": ("all",), "choice_labels": {"all": "any error"}}
@@ -61,18 +60,8 @@ class AdjustPanel(AnalysisPanel):
         return (*super().result_key(state), state.exclusions)  # even if an excluded one is zero
 
     def headline(self, result: Any) -> Markup:
-        if not result.before.max_um:
-            return tag("p", "The error is zero everywhere; no adjustment is needed.")
-        if not result.adjustable:
-            text = "No squareness or alignment error acts in this loop; select “any error” below."
-            return tag("p", text)
-        if not self.offered_changes(result):
-            keys = ", ".join(result.adjustable)
-            limits = "" if result.analysis.unconstrained else " within tolerance"
-            text = f"No adjustment of {keys}{limits} reduces the error by 1 % or more."
-            return tag("p", text)
-        objective = "largest |E|" if result.objective is Objective.MAX else "RMS of |E|"
-        return quiet(f"Adjustments that minimise the {objective}.")
+        criterion = "largest |E|" if result.objective is Objective.MAX else "RMS of |E|"
+        return HTML.adjustments(result, self.offered_changes(result), criterion)
 
     def offered_changes(self, result: Any) -> Sequence[int]:
         return result.worthwhile
@@ -107,11 +96,8 @@ class BestPanel(AdjustPanel):
         key = self.result_key(state)
         self.run_if_stale(state)
         is_current = outcome is not None and outcome.key == key
-        status = "No single adjustment improves it." if is_current else "Searching …"
-        body = self.problem_html(state) or self.cards_html(key)
-        body = body or quiet(status)
-        body += RECORD if key == self._applied_key else EMPTY
-        return {self.name: tag("h4", "Best single adjustment") + body}
+        content = self.problem_html(state) or self.cards_html(key)
+        return {self.name: HTML.best(content, is_current, key == self._applied_key)}
 
 
 def _is_of_errors(picture: LivePicture) -> bool:
@@ -123,22 +109,15 @@ def _is_of_errors(picture: LivePicture) -> bool:
 MOST_POINTS = 101  # per axis on the page; the command accepts as many as the controller
 RESOLUTION_UM = 0.005  # a smaller residual, or one below the resolution of the file, is rounding
 STEM, DATE = "compensation", (1980, 1, 1, 0, 0, 0)  # the same table gives the same bytes
-Box = Literal["machine", "comparison", "residual"]
-MACHINE: Box = "machine"
-COMPARISON: Box = "comparison"
-RESIDUAL: Box = "residual"
-BOXES: dict[Box, str] = {
-    MACHINE: "uncompensated",
-    COMPARISON: "before and after",
-    RESIDUAL: "residual error",
-}
+MACHINE, COMPARISON, RESIDUAL = BOXES = ("machine", "comparison", "residual")
+"""States of the map: uncompensated, before and after, residual error."""
 
 
 class CompensatePanel(AnalysisPanel):
     """A compensation table: computed when a controller is chosen; applied to the map when saved."""
 
     runs_on_open = True
-    _picture: tuple[Result, str] | None = None
+    _maps: tuple[Result, str] | None = None
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
         if not self.is_ready(state):
@@ -168,11 +147,7 @@ class CompensatePanel(AnalysisPanel):
 
     def before_result(self, state: AppState) -> Markup:
         chosen = self.values(state).get("formats", "")
-        names = {"": "Select controller …"} | _writable()
-        control = choice(do.SetOption(self.name, "formats"), chosen, names, label="Controller")
-        if chosen:
-            return control
-        return control + quiet("A compensation table for the controller, and the residual error.")
+        return HTML.controllers(self.name, chosen, _writable())
 
     def headline(self, result: Result) -> Markup:
         return EMPTY
@@ -180,34 +155,14 @@ class CompensatePanel(AnalysisPanel):
     def result_html(self, result: Any) -> Markup:
         """Render before and after side by side; assumptions are folded away."""
         _, table, *assumptions = result.blocks()
-        drawn = [result_html([table])]
-        if _is_rounding(result):
-            text = "The residual error is below the resolution of the file."
-            drawn.append(tag("p", text, class_="ws-pass"))
-        if self._picture is not None and self._picture[0] is result:
-            drawn.append(tag("img", src=self._picture[1], alt="Maps of |E| before and after",
-                             width="100%"))  # fmt: skip
-        return join(drawn) + details_html(assumptions, "Points, loop, assumptions")
+        maps = self._maps[1] if self._maps is not None and self._maps[0] is result else ""
+        folded = details_html(assumptions, "Points, loop, assumptions")
+        return HTML.compensation(result_html([table]), _is_rounding(result), maps, folded)
 
     def actions(self, result: Any, *, stale: bool) -> Markup:
-        state, hint = self.context.state, "Several files are saved as one ZIP file"
+        state, draws = self.context.state, self.context.services.draw_compensation is not None
         is_applicable = is_applicable_to(state, result.controller)
-        disabled = {RESIDUAL} if _is_rounding(result) else set[str]()
-        boxes = join(
-            button(label, do.ShowBox(key), pressed=key == box_of(state), kind="chip",
-                   disabled=not is_applicable or key in disabled,
-                   hint="Residual below numerical resolution" if key in disabled else "")
-            for key, label in BOXES.items()
-        )  # fmt: skip
-        row = [button("Save table", do.Signal.SAVE_TABLE, kind="main", hint=hint)]
-        if self.context.services.draw_compensation is not None:
-            row.append(button("Maps", do.DrawMaps(), hint="Before, after and residual error"))
-            row.append(button("Save maps", do.DrawMaps(save=True), hint="One sheet for a report"))
-        row.append(button("Add to report", do.AddToReport(self.name), kind="quiet"))
-        row += [RECORD] if box_of(state) != MACHINE else []
-        box_choice = tag("div", tag("span", "Map", class_="ws-quiet") + boxes,
-                         class_="ws-actions", role="group", aria_label="Map")  # fmt: skip
-        return actions(*row) + box_choice
+        return HTML.buttons(self.name, draws, box_of(state), is_applicable, _is_rounding(result))
 
     @property
     def _compensation(self) -> Compensation | None:
@@ -221,14 +176,21 @@ class CompensatePanel(AnalysisPanel):
 
     @on(do.DrawMaps)
     def draw_maps(self, state: AppState, action: do.DrawMaps) -> None:
-        if (result := self._compensation) is not None:
-            self._draw(result, dark=state.shown.dark, saves=action.save)
+        result, draw = self._compensation, self.context.services.draw_compensation
+        if result is None or draw is None:
+            return
+        dark, saves = state.shown.dark, action.save
+        save = partial(self.context.save_file, f"{STEM}.png")
+        self._run_job(
+            "Drawing the maps", lambda job: draw(result, dark, not saves, job),
+            save if saves else partial(self._show_maps, result),
+        )  # fmt: skip
 
     @on(do.Signal.SAVE_TABLE)
     def save_table(self, state: AppState) -> AppState | None:
         if (result := self._compensation) is not None:
             self.context.call_soon(partial(self.context.save_file, *packed(result)))
-        return self.show_box(state, do.ShowBox(COMPARISON))
+        return self.show_box(state, do.ShowBox("comparison"))
 
     @on(do.ShowBox)
     def show_box(self, state: AppState, action: do.ShowBox) -> AppState | None:
@@ -245,18 +207,8 @@ class CompensatePanel(AnalysisPanel):
     def body(self, picture: LivePicture) -> Markup:
         return self._body(picture.state)  # with and without its table
 
-    def _draw(self, result: Compensation, *, dark: bool, saves: bool) -> None:
-        draw = self.context.services.draw_compensation
-        if draw is None:
-            return
-        save = partial(self.context.save_file, f"{STEM}.png")
-        self._run_job(
-            "Drawing the maps", lambda job: draw(result, dark, not saves, job),
-            save if saves else partial(self._show_maps, result),
-        )  # fmt: skip
-
     def _show_maps(self, result: Compensation, png: bytes) -> None:
-        self._picture = result, f"data:image/png;base64,{base64.b64encode(png).decode()}"
+        self._maps = result, f"data:image/png;base64,{base64.b64encode(png).decode()}"
         self.rerender()
 
 
@@ -283,7 +235,7 @@ def packed(result: Compensation) -> tuple[str, bytes]:
 
 
 def with_box(state: AppState, box: str, controller: Controller) -> AppState:
-    """Set the compensation state of the map: a key of `BOXES`; others are ignored."""
+    """Set the compensation state of the map: one of `BOXES`; others are ignored."""
     if box not in BOXES or (box == box_of(state) and state.controller in (None, controller)):
         return state
     bare = without_table(state)
@@ -297,7 +249,7 @@ def with_box(state: AppState, box: str, controller: Controller) -> AppState:
 
 
 def box_of(state: AppState) -> str:
-    """Return the compensation state of the map, a key of `BOXES`."""
+    """Return the compensation state of the map, one of `BOXES`."""
     if state.controller is None:
         return MACHINE
     before = state.comparison.a.state

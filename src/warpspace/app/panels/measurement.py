@@ -12,10 +12,9 @@ from warpspace.analysis.blocks import Lines, Table
 from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.registry import Entry
 from warpspace.app.browser import actions as do
-from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button, choice, join, number, tag
-from warpspace.app.browser.html import field as labelled
+from warpspace.app.browser.html import EMPTY, join
 from warpspace.app.browser.page import error_words
+from warpspace.app.browser.templates import Templates
 from warpspace.app.documents.transfers import read_upload
 from warpspace.app.drawing.around import residuals
 from warpspace.app.drawing.shapes import Nodes, Shapes
@@ -24,21 +23,22 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import chosen_test, plan_test
 from warpspace.app.panels.analysis_panel import AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
-from warpspace.app.panels.panel import Context, Job, Jobs, actions, alert, details, on, quiet, tiny
+from warpspace.app.panels.panel import Context, Jobs, on
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import TEST, with_form
-from warpspace.bench.base import BenchResult, BenchTest, bench_names, find_test
+from warpspace.bench.base import BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table as parse_test
 from warpspace.calibration.calibrate import Calibrate
-from warpspace.calibration.calibration_result import Calibration, Estimability
+from warpspace.calibration.calibration_result import Calibration
 from warpspace.calibration.readings import bundled_data, find_data, parse_reading_table
 from warpspace.calibration.registry import KINDS, parse_readings
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import decode_text
-from warpspace.units import UM_PER_MM, Array
+from warpspace.units import Array
 
+HTML = Templates("measurement")
 MOST_BYTES = 2 * 2**20  # of a file of readings
 WHAT = "CSV file of readings"
 
@@ -75,28 +75,14 @@ class FilesPanel(AnalysisPanel):
         self.files = files
 
     def files_html(self) -> Markup:
-        lines: list[tuple[Markup, Markup]] = []
-        for index, file in enumerate(self.files):
-            remove = button("✕", do.RemoveFile(self.name, index), kind="link",
-                            aria_label=f"Remove {file.name}")  # fmt: skip
-            lines.append((tag("span", file.name) + tag("small", f" {file.description}"), remove))
-        problem = alert(self._upload_problem)
-        table = html.rows(lines) if lines else EMPTY
-        return join((problem if self._upload_problem else EMPTY, table, self._uploads.html()))
+        return HTML.files(self.name, self.files, self._upload_problem, self._uploads.html())
 
     def upload_html(self, label: str) -> Markup:
-        hint = f"A CSV file with a header, at most {MOST_BYTES >> 20} MB"
-        return actions(html.upload_button(label, self.name, MOST_BYTES, ".csv", hint=hint))
+        return HTML.upload(label, self.name, MOST_BYTES)
 
     def receive(self, read: Callable[[], tuple[str, bytes]]) -> None:
         """Parse files in jobs, one after the other; errors are shown above the files."""
-
-        def work(job: Job) -> None:
-            accept = self.parse(*read())
-            if not job.is_set():
-                self.context.call_soon(partial(self._accept, accept))
-
-        self._uploads.start("Reading", work)
+        self._run_job("Reading", lambda _: self.parse(*read()), self._accept, self._uploads)
 
     def _accept(self, accept: Callable[[], None]) -> None:
         self._upload_problem = ""
@@ -123,9 +109,6 @@ class FilesPanel(AnalysisPanel):
 
 
 # --- Standard tests -------------------------------------------------------------------------------
-
-
-NOT_DRAWN = "Its path is not drawn in the compensated box."
 
 
 class TestsPanel(FilesPanel):
@@ -164,34 +147,18 @@ class TestsPanel(FilesPanel):
     def body(self, picture: LivePicture) -> Markup:
         state, kind = picture.drawn_state, chosen_test(picture.drawn_state)
         tests = [find_test(name) for name in bench_names()]
-        names = {"": "Select a test …"}
-        names |= {test.name: f"{test.title} ({test.standard})" for test in tests}
-        chooser = choice(
-            do.Input.CHOOSE_TEST(), state.forms.get(TEST, ""), names, label="Standard test"
-        )
+        titles = {test.name: f"{test.title} ({test.standard})" for test in tests}
+        titles, chosen = {"": "Select a test …", **titles}, state.forms.get(TEST, "")
         if kind is None:
-            return chooser
-        test = self._body(state)
-        if state.controller is not None:
-            test = tiny(f"{without_words(state)} {NOT_DRAWN}") + test
-        if picture.is_difference:
-            test = alert("Not available for the difference of two machines: show A or B.")
-        columns = ",".join(column.name for column in kind.columns)
-        about = tag("p", kind.description) + tag("p", f"Columns of a file: {columns}")
-        return join((
-            chooser, test, self.files_html(),
-            EMPTY if self.files else self.upload_html("Measured readings …"),
-            html.switch(do.SetOption(TEST, "path"), "Show test path",
-                   on=state.forms.get("test.path") != "0",
-                   hint="Nominal grey, actual coloured, with the exaggeration of the map"),
-            details("Procedure", tag("div", about), kind="details", data_key="test.procedure"),
-        ))  # fmt: skip
+            return HTML.test(titles, chosen)
+        remark = "" if state.controller is None else without_words(state)
+        test = EMPTY if picture.is_difference else self._body(state)
+        upload = EMPTY if self.files else self.upload_html("Measured readings …")
+        draws_path = state.forms.get("test.path") != "0"
+        return HTML.test(titles, chosen, kind, test, remark, self.files_html(), upload, draws_path)
 
     def headline(self, result: Result) -> Markup:
-        assert isinstance(result, BenchResult)  # noqa: S101 - of a test
-        rms = result.rms_difference
-        difference = EMPTY if rms is None else tag("p", f"RMS of measured − model: {number(rms)}")
-        return difference + tiny(result.model.plan.place)
+        return HTML.deviations(result)
 
     def result_html(self, result: Result) -> Markup:
         return join(map(block_html, (*result.blocks_of(Lines), *result.blocks_of(Table))))
@@ -222,10 +189,6 @@ LONGEST_KIND = 200
 MOST_NAMED = 12  # errors and notes that are listed
 ARROWS = {"": "none", "before": "before", "after": "after"}
 ROTATED = "No arrows: a rotary axis carries the workpiece, and the drawing does not rotate with it."
-ESTIMABILITY = (
-    (Estimability.CONFOUNDED, "Confounded"),
-    (Estimability.NOT_ESTIMABLE, "Not estimable, unchanged"),
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -264,13 +227,9 @@ def read_uploaded(
 class CalibratePanel(FilesPanel):
     """Uploaded readings, fitted errors, and residuals as arrows in the drawing."""
 
-    unsupported = ("kinds",)  # set per file
+    own_kind, unsupported = CalibrateTexts, ("kinds",)  # set per file
     _next_kind, _arrows = "", ""
     _drawn: Nodes | None = None
-
-    @property
-    def kind(self) -> type[Analysis]:
-        return CalibrateTexts
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), "next_count": "3"}
@@ -279,46 +238,25 @@ class CalibratePanel(FilesPanel):
         return {"files": self.files}
 
     def before_result(self, state: AppState) -> Markup:
-        introduction = "Errors of this machine are fitted to readings in CSV files."
         bundled = {"": "Bundled readings …"} | {name: name for name in bundled_data()}
         kinds = {"": "recognised by its columns"}
         kinds |= {name: _kind_words(name) for name in (*KINDS, *bench_names())}
-        name, _, options = self._next_kind.partition(":")
-        return join((
-            self.files_html(), EMPTY if self.files else quiet(introduction),
-            self.upload_html("Add readings …"),
-            choice(do.Input.ADD_READINGS(), "", bundled, label="Bundled readings"),
-            labelled("Kind", choice(do.Input.SET_READING_KIND(), name, kinds),
-                     do.Input.SET_READING_KIND(), hint="Kind of the readings to be added"),
-            html.text_box(do.Input.SET_TEST_OPTIONS(), options, label="Test options",
-                     placeholder="plane=XZ:radius=150") if name in bench_names() else EMPTY,
-        ))  # fmt: skip
+        kind, _, options = self._next_kind.partition(":")
+        return HTML.readings(
+            self.files_html(), not self.files, self.upload_html("Add readings …"), bundled, kinds,
+            kind, options if kind in bench_names() else None,
+        )  # fmt: skip
 
     def headline(self, result: Result) -> Markup:
-        assert isinstance(result, Calibration)  # noqa: S101 - of this analysis
-        before, after = UM_PER_MM * result.rms_before_mm, UM_PER_MM * result.rms_after_mm
-        count = sum(len(group.readings) for group in result.fitted)
-        parts = [tag("p", join((f"RMS of {count} residuals: {number(before)} → ",
-                                tag("b", f"{number(after)} µm"))))]  # fmt: skip
-        for status, title in ESTIMABILITY:
-            keys = [p.key for p in result.parameters if p.estimable is status]
-            if keys:
-                omitted = f" and {len(keys) - MOST_NAMED} more" if len(keys) > MOST_NAMED else ""
-                names = ", ".join(keys[:MOST_NAMED])
-                parts.append(quiet(f"{title}: {names}{omitted}"))
-        notes = (tag("p", note, class_="ws-caveat") for note in result.notes[:MOST_NAMED])
-        return join((*parts, *notes))
+        return HTML.residuals(result, MOST_NAMED)
 
     def result_html(self, result: Result) -> Markup:
         blocks = list(result.blocks())
         visible = [next(block for block in blocks if isinstance(block, Lines))]
         visible += [b for b in blocks if isinstance(b, Table) and len(b.columns) == 4]
-        show = do.Input.SHOW_RESIDUALS()
-        arrows = labelled("Residual arrows", choice(show, self._arrows, ARROWS), show,
-                          hint="Observed − predicted at each reading, exaggerated")  # fmt: skip
-        status = tiny(self._draw_arrows())
         folded = details_html(block for block in blocks if block not in visible)
-        return join((arrows, status, *map(block_html, visible), folded))
+        arrows = HTML.arrows(self._arrows, ARROWS, self._draw_arrows())
+        return join((arrows, *map(block_html, visible), folded))
 
     @on(do.Input.SET_READING_KIND, later=True)
     def set_kind(self, kind: str) -> None:

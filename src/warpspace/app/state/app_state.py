@@ -433,12 +433,7 @@ class AppState:
         fresh, unchanged = start_state(scene), {name: getattr(self, name) for name in KEPT_FIELDS}
         of_part = ("part.", "program.")
         forms = {k: v for k, v in self.forms.items() if not k.startswith(of_part)}
-        changed = replace(
-            fresh,
-            forms={**forms, **fresh.forms},
-            **unchanged,
-        )
-        return changed.within_reach()
+        return replace(fresh, forms={**forms, **fresh.forms}, **unchanged).within_reach()
 
     def within_reach(self) -> "AppState":
         """Clamp slices, axes and held angles to the scene's ranges; drop those without an axis."""
