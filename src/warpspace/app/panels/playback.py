@@ -23,16 +23,10 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import played_axis
 from warpspace.app.panels.panel import Context, Panel, Refresh, on
 from warpspace.app.state.app_state import AppState
-from warpspace.machine.axes import parameter
-from warpspace.picture.formatting import spell_factor
+from warpspace.picture.formatting import spell_cause, spell_factor
 from warpspace.units import MINUS
 
 MOST_LETTERS = 60  # of a line of the program
-MOSTLY = 0.5  # share of an error above which its largest contribution is most of it
-
-
-def share_words(share: float) -> str:
-    return "mostly" if share > MOSTLY else "partly"
 
 
 class PlaybackPanel(Panel):
@@ -110,18 +104,18 @@ class PlaybackPanel(Panel):
                 button("→", do.Signal.NEXT_STEP, kind="quiet", hint="Next step (→)",
                        aria_label="Next step"),
                 *buttons,
+                _export("story"),
                 button("End", do.Signal.END_STORY, kind="quiet",
                        hint="Return to the previous view (Esc)"),
             ]  # fmt: skip
         names = {name: name for name in tracks if name != STORY}
         if len(names) > 1:
             buttons.insert(0, html.choice(do.Input.CHOOSE_TRACK(), chosen, names, label="Play"))
-        motions: dict[str | None, do.Motion] = {played_axis(state): "rotation"}
+        motions: dict[str | None, do.Motion] = {played_axis(state): "rotation", PROGRAM: "program"}
         if not state.shows_rotary:
             motions[EXAGGERATION] = "exaggeration"
         if chosen in motions:
-            buttons.append(button("Export", do.SaveAnimation(motions[chosen]), kind="quiet",
-                                  hint="Save as an animated WebP"))  # fmt: skip
+            buttons.append(_export(motions[chosen]))
         hint = "Return to the state of the scene"
         return [*buttons, button("Reset", do.Signal.STOP_PLAYBACK, kind="quiet", hint=hint)]
 
@@ -166,6 +160,12 @@ class PlaybackPanel(Panel):
             self.context.player.move(PROGRAM, float(np.argmax(lengths)))
 
 
+def _export(motion: do.Motion) -> Markup:
+    kinds = (button("Animated WebP", do.SaveAnimation(motion), kind="quiet"),
+             button("MP4 video", do.SaveAnimation(motion, ".mp4"), kind="quiet"))  # fmt: skip
+    return html.menu("Export", join(kinds), key="animation", kind="up", hint="Save as a file")
+
+
 def _program_words(picture: LivePicture, sample: int) -> tuple[str, Markup]:
     """Format the line of the program; and its text, its error and the main cause of this."""
     path = picture.path
@@ -192,8 +192,7 @@ def _error_words(picture: LivePicture, sample: int) -> str:
     amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
     along = amplitudes * (path.response[:, 3 * sample : 3 * sample + 3] @ error) / length
     first = int(np.argmax(np.abs(along)))
-    cause = parameter([*state.amplitudes][first]).cause
-    return f"{words}, {share_words(float(along[first]) / length)} because {cause}"
+    return f"{words}, {spell_cause([*state.amplitudes][first], float(along[first]) / length)}"
 
 
 def _read_number(text: str) -> float | None:
