@@ -206,19 +206,18 @@ class EditorSection(panel.Section):
     name, task, title = "editor", "machine", "Edit the machine"
     sentence = "Axes, their order, offsets and travels; or another machine to start from"
 
-    _refused = ("", "")  # rejected chain and error message
+    _problem = ""  # of a rejected chain
 
     def body(self, picture: LivePicture) -> Markup:
         state, name = picture.state, do.EditMachine("chain")
         chain, tables = state.scene.machine.chain, machine_edits.tables_of(state.scene)
-        typed, problem = self._refused if self._refused[1] else (str(chain), "")
-        box = text_box(name, typed, aria_invalid=str(bool(problem)).lower())
+        box = text_box(name, str(chain))
         machine_buttons = (
             button(label, action, hint=hint) for label, action, hint in MACHINE_BUTTONS
         )
         return join((
             html.field("Chain", box, name, hint=CHAIN_HINT),
-            panel.alert(problem) if problem else EMPTY,
+            panel.alert(self._problem) if self._problem else EMPTY,
             *(_frame(state, tables, frame)
               for frame in ("w", *reversed(chain.workpiece), *chain.tool, "S", "t")),
             _bodies(tables["mesh"]),
@@ -228,13 +227,12 @@ class EditorSection(panel.Section):
 
     @panel.on(do.EditMachine)
     def edit(self, state: AppState, action: do.EditMachine) -> AppState:
-        self._refused = ("", "")
+        self._problem = ""
         word = action.edit if action.value is None else f"{action.edit} {action.value}"
         changed = machine_edits.with_word(state, word)
         notes = changed.notes[len(state.notes) :]
         if action.edit == "chain" and notes and changed.scene is state.scene:
-            message = "\n".join(notes).removesuffix(f"; {machine_edits.UNCHANGED}")
-            self._refused = (action.value or "")[:200], message
+            self._problem = "\n".join(notes)
             self.context.call_soon(self.rerender)
             return state
         return changed
