@@ -276,7 +276,7 @@ def _program_frame(
     canvas.lines([*actual[path.segments]], width=3.4, colour=colours, zorder=3.5)
     canvas.disc(actual[sample], 6.0, canvas.theme.accent)
     ends = {"max": float(values.max()), "mean": float(values.mean())}
-    rows = [(name, f"{spell_fixed(value)} {MICROMETRE}") for name, value in ends.items()]
+    rows = [(name, f"{spell_fixed(um)} {MICROMETRE}") for name, um in ends.items()]
     heading, bars = quantity_words(figure.component), (camera.px_per_mm, factor)
     sheet.draw_panel(picture.scale, heading, [*ends.items()], rows, bars)
     return sheet.finish(factor)
