@@ -3,7 +3,7 @@
 import io
 import os
 import subprocess
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -38,13 +38,18 @@ from warpspace.outputs.figures.maps import draw_statistics, isoline_words
 from warpspace.outputs.figures.registry import draw_figure
 from warpspace.outputs.file_output import check_target, write_atomically
 from warpspace.outputs.processes import ProcessPool
-from warpspace.parts.program import Program, explain_sample, trace_program
+from warpspace.parts.program import Program, ToolPath, explain_sample, trace_program
 from warpspace.picture.formatting import quantity_words, spell_cause
-from warpspace.picture.model import choose_exaggeration, choose_scale, evaluate_picture
+from warpspace.picture.model import (
+    ScenePicture,
+    choose_exaggeration,
+    choose_scale,
+    evaluate_picture,
+)
 from warpspace.picture.traces import TraceLine, evaluate_traces
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
-from warpspace.units import MICROMETRE, Array, Integers, spell, spell_fixed, spell_short
+from warpspace.units import MICROMETRE, Array, spell, spell_fixed, spell_short
 
 MOTIONS = ("exaggeration", "rotation", "program", "story")
 MIN_FRAMES, MAX_FRAMES = ANIMATION_FRAMES
@@ -199,55 +204,45 @@ def _rotation_frame(scene: Scene, figure: FigureSettings, phase: float) -> Drawi
     return sheet.finish(factor)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _PathPicture:
-    """The path of a program over the workpiece, in R."""
-
-    nominal_mm: Array  # [n, 3]
-    error_um: Array  # [n, 3]
-    segments: Integers  # [m, 2]; samples at both ends of its lines
-    bounds_mm: Array  # [n, 3]; corners of boxes around the bodies in all pictures
-
-
 def _program_frames(scene: Scene, settings: AnimationSettings) -> list[Frame]:
     """Build the pictures along a program, with the same number of samples between them."""
     analysis = settings.program.of_scene(scene)
     program, lines = analysis.read(scene), [*analysis.lines()]
     path = trace_program(program)
     samples = np.linspace(0, len(path.line) - 1, settings.frames).astype(int).tolist()
-    points = [explain_sample(program, path, sample) for sample in samples]
-    # the path is drawn where the linear axes of the scene stand
-    turned = [{k: at for k, at in one.axes.items() if not is_linear(k)} for one in points]
-    picture, turning = evaluate_for(settings.figure, scene), turning_frames(scene.machine)
-    view, factor = picture.view, picture.exaggeration
-    bounds = [
+    picture = evaluate_for(settings.figure, scene)
+    corners = [
         _box_corners(part.vertices_mm)
-        for positions in turned
-        for part in place_bodies(scene, view, factor, turning, positions=positions)
+        for sample in samples
+        for part in _turning_bodies(picture, path, sample)
     ]
+    reach = np.concatenate([np.zeros((0, 3)), *corners])
     stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
     pose = np.asarray(branch_pose(scene.model, "workpiece", stand))
-    ends = np.flatnonzero(path.step_mm.any(axis=1))
-    drawn = _PathPicture(
-        transforms.apply(pose, path.tip_mm),
-        transforms.rotate(pose[:3, :3], path.error_um),
-        np.stack([ends - 1, ends], axis=1),
-        np.reshape(bounds, (-1, 3)),
-    )
+    tip, error_um = transforms.apply(pose, path.tip_mm), path.error_um @ pose[:3, :3].T
+    in_r = replace(path, tip_mm=tip, error_um=error_um, uncertainty=None)
     frames: list[Frame] = []
-    for sample, point, positions in zip(samples, points, turned, strict=True):
+    for sample in samples:
+        point = explain_sample(program, path, sample)
         code = lines[point.line - 1].strip()[:MOST_LETTERS] if point.line <= len(lines) else ""
         causes = [spell_cause(key, um / point.um) for key, um in point.budget.items() if point.um]
         error = ", ".join([f"|E| {spell_fixed(point.um)} {MICROMETRE}", *causes[:1]])
         figure = replace(settings.figure, caption=f"line {point.line}: {code}\n{error}")
-        frames.append(partial(_program_frame, scene, figure, drawn, sample, positions))
+        frames.append(partial(_program_frame, scene, figure, in_r, sample, reach))
     return frames
 
 
+def _turning_bodies(picture: ScenePicture, path: ToolPath, sample: int) -> tuple[PlacedBody, ...]:
+    """Place the rotary axes at a sample; the path is drawn where the linear axes stand."""
+    scene = picture.scene
+    positions = {name: at for name, at in path.axes_at(sample).items() if not is_linear(name)}
+    turning = turning_frames(scene.machine)
+    return place_bodies(scene, picture.view, picture.exaggeration, turning, positions=positions)
+
+
 def _program_frame(
-    scene: Scene, figure: FigureSettings, path: _PathPicture, sample: int,
-    positions: Mapping[str, float],
-) -> Drawing:  # fmt: skip
+    scene: Scene, figure: FigureSettings, path: ToolPath, sample: int, reach_mm: Array
+) -> Drawing:
     picture = evaluate_for(figure, scene)
     factor, values = picture.exaggeration, component_values(path.error_um, figure.component)
     legend = [
@@ -258,27 +253,27 @@ def _program_frame(
     title, facts = f"Path of the program: {scene.title}", scene_facts(picture, factor)
     sheet = start_sheet("program", figure, title, facts, [scene], legend, exact=True)
     canvas, nodes = sheet.canvas, picture.grid.nominal_mm.reshape(-1, 3)
-    actual_mm = deform(path.nominal_mm, path.error_um, factor)
-    reach = np.concatenate([nodes, path.nominal_mm, actual_mm, path.bounds_mm])
+    actual_mm = deform(path.tip_mm, path.error_um, factor)
     side, (x_left, bottom, right, top) = canvas.px(20.0), sheet.content
     inner = (x_left + side, bottom + side, right - side, top - side)
+    reach = np.concatenate([nodes, path.tip_mm, actual_mm, reach_mm])
     camera = fit_projection(figure.view, reach, inner)
-    turning = turning_frames(scene.machine)
-    placed = place_bodies(scene, picture.view, factor, turning, positions=positions)
-    machine = draw_bodies(canvas, placed, camera, nominal=False)
+    bodies = _turning_bodies(picture, path, sample)
+    machine = draw_bodies(canvas, bodies, camera, nominal=False)
     edges = (nodes[edge] for edge in box_edges(picture.shape))
     style = {"colour": canvas.theme.ghost, "dashes": GHOST_DASHES, "zorder": 2.2}
     draw_split(canvas, edges, camera, machine, alpha=(1.0, 0.5), **style)
-    nominal, actual = camera.project(path.nominal_mm), camera.project(actual_mm)
-    thin = {"width": SIZES.thin, "colour": canvas.theme.muted}
-    canvas.lines([*nominal[path.segments]], zorder=3.0, **thin)
-    colours = picture.scale.colours(values[path.segments].mean(axis=1)) / 255.0
-    canvas.lines([*actual[path.segments]], width=3.4, colour=colours, zorder=3.5)
+    ends = np.flatnonzero(path.step_mm.any(axis=1))
+    segments = np.stack([ends - 1, ends], axis=1)
+    nominal, actual = camera.project(path.tip_mm)[segments], camera.project(actual_mm)
+    canvas.lines([*nominal], width=SIZES.thin, colour=canvas.theme.muted, zorder=3.0)
+    colours = picture.scale.colours(values[segments].mean(axis=1)) / 255.0
+    canvas.lines([*actual[segments]], width=3.4, colour=colours, zorder=3.5)
     canvas.disc(actual[sample], 6.0, canvas.theme.accent)
-    ends = {"max": float(values.max()), "mean": float(values.mean())}
-    rows = [(name, f"{spell_fixed(um)} {MICROMETRE}") for name, um in ends.items()]
+    marks = [("max", float(values.max())), ("mean", float(values.mean()))]
+    rows = [(name, f"{spell_fixed(um)} {MICROMETRE}") for name, um in marks]
     heading, bars = quantity_words(figure.component), (camera.px_per_mm, factor)
-    sheet.draw_panel(picture.scale, heading, [*ends.items()], rows, bars)
+    sheet.draw_panel(picture.scale, heading, marks, rows, bars)
     return sheet.finish(factor)
 
 
