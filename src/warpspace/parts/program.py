@@ -251,7 +251,8 @@ class PathPoint:
 
 def explain_sample(program: ParsedProgram, path: ToolPath, sample: int) -> PathPoint:
     scene, axes = program.scene, path.axes_at(sample)
-    view, length = scene.view(Loop.RELATIVE, "workpiece"), program.length_mm[path.move[sample]]
+    view = scene.view(Loop.RELATIVE, "workpiece")
+    length = float(program.length_mm[path.move[sample]])
     parts = explain(with_length(scene.model, length), scene.errors, axes, view).contributions
     ranked = sorted(parts, key=lambda part: -part.along_um)
     u95 = ExpandedUncertainty[float | None]()
