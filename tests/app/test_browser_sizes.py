@@ -198,6 +198,8 @@ def test_a_phone_has_the_drawing_on_top_and_the_columns_below(viewer, browser):
     assert within(box, free)
     assert within(found["legend"], found["room"])
     assert "mean 30.9 µm" in phone.part("head").inner_text()
+    names = phone.page.locator(".ws-words [data-kind=axis]").all_inner_texts()
+    assert sorted(names) == ["X [mm]", "Y [mm]", "Z [mm]"]
     for action in (do.SetError("EXX", "1"), do.SetError("EYY", "1"), do.Signal.UNDO):
         phone.send(action)
     for step in ("undo", "redo"):

@@ -21,6 +21,7 @@ from warpspace.app.documents.transfers import exported_words, file_stem, shown_s
 from warpspace.app.drawing.camera import CameraMemory, fit_camera
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.live_model import DrawnScale, LiveModel
+from warpspace.app.evaluation.scene_overlays import program_of
 from warpspace.app.panels.panel import Job
 from warpspace.app.state.app_state import Picked, Side, start_state
 from warpspace.app.state.tree import put
@@ -28,6 +29,7 @@ from warpspace.cli import services
 from warpspace.cli.services import draw_animation, draw_figure, draw_view, write_export
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
+from warpspace.outputs import animation
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.registry import draw_figure as draw
 from warpspace.picture.formatting import range_words
@@ -48,13 +50,19 @@ def picture_of(shown, state=BOTH):
     return LIVE.evaluate(put(state, "comparison.shown", shown))
 
 
-def test_an_animation_is_a_webp_up_to_the_factor_of_the_drawing(monkeypatch):
-    monkeypatch.setattr(services, "ANIMATION_FRAMES", 4)
+@pytest.fixture
+def _short(monkeypatch):
+    """Animations of four small pictures."""
+    monkeypatch.setattr(animation, "default_frames", lambda *_: (4, 15.0))
     monkeypatch.setattr(services, "ANIMATION_SIZE", (400, 300))
+
+
+@pytest.mark.usefixtures("_short")
+def test_an_animation_is_a_webp_up_to_the_factor_of_the_drawing():
     shares, job = [], Job("Animation", lambda: None)
     job.report_progress = shares.append
     paused = LIVE.evaluate(START, DrawnScale(10.0))  # the player stands at a smaller factor
-    film = Image.open(BytesIO(draw_animation(paused, "exaggeration", job)))
+    film = Image.open(BytesIO(draw_animation(paused, "exaggeration", ".webp", job)))
     assert (film.format, film.n_frames, film.size) == ("WEBP", 4, (400, 300))
     assert shares == [0.25, 0.5, 0.75, 1.0]
     frames = []
@@ -66,14 +74,33 @@ def test_an_animation_is_a_webp_up_to_the_factor_of_the_drawing(monkeypatch):
     assert away[3] == pytest.approx(away[1], rel=0.05)  # .. back
 
 
-def test_an_animation_is_cancelled_and_shows_one_machine(monkeypatch):
-    monkeypatch.setattr(services, "ANIMATION_FRAMES", 4)
+@pytest.mark.usefixtures("_short")
+def test_the_program_of_a_page_is_written_as_a_video_in_the_settings_of_the_page():
+    text = "G21 G90 G54\nG0 X-200 Y0 Z-100\nG1 X200 F500\nM30\n"
+    part = replace(START.part, program=text, program_name="a.nc")
+    state = replace(START, part=part, forms={"program.length_mm": "80"})
+    picture, drawn = LIVE.evaluate(state), program_of(state, state.active_scene())
+    assert (drawn.length_mm, drawn.file) == (80.0, "a.nc")
+    video = draw_animation(picture, "program", ".mp4", Job("Animation", lambda: None))
+    assert video[4:8] == b"ftyp"
+
+
+@pytest.mark.usefixtures("_short")
+def test_the_story_of_a_page_is_written_step_by_step():
+    notes = load_scene("review_dvf5000").review
+    state = replace(START, review=notes)
+    film = draw_animation(LIVE.evaluate(state), "story", ".webp", Job("Animation", lambda: None))
+    assert Image.open(BytesIO(film)).n_frames > 1
+
+
+@pytest.mark.usefixtures("_short")
+def test_an_animation_is_cancelled_and_shows_one_machine():
     job = Job("Animation", lambda: None)
     job.set()
     with pytest.raises(CancelledError):
-        draw_animation(LIVE.evaluate(START), "exaggeration", job)
+        draw_animation(LIVE.evaluate(START), "exaggeration", ".webp", job)
     with pytest.raises(OptionError, match="one machine"):
-        draw_animation(picture_of("difference"), "exaggeration", job)
+        draw_animation(picture_of("difference"), "exaggeration", ".webp", job)
 
 
 def rows_of(picture):

@@ -185,12 +185,14 @@ def test_errors_measured_on_another_chain_are_assumptions_and_the_title_says_so(
     assert with_word(changed, "own").scene is opened.scene
 
 
-def test_a_chain_that_is_refused_stays_in_its_box_with_the_reason(state):
+def test_a_chain_that_is_refused_leaves_the_accepted_one_in_its_box_with_the_reason(state):
     editor = lone_part(machine_editor.EditorSection)
     assert editor.handle(state, do.EditMachine("chain", "wC<script>")) is state
     text = editor.body(LIVE.evaluate(state))
-    assert 'value="wC&lt;script&gt;"' in text
+    assert f'value="{state.scene.machine.chain}"' in text
+    assert "wC&lt;script&gt;" in text
     assert "cannot be read" in text
+    assert "the machine is unchanged" in text
     assert "<script>" not in text
     moved = editor.handle(state, do.EditMachine("offset X 0", "12,5"))
     assert moved.scene.machine.axes["X"].offset_mm[0] == 12.5

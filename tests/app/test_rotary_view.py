@@ -182,6 +182,7 @@ def test_the_exaggeration_is_played_where_nothing_else_is_drawn_that_plays():
     assert f'max="{np.log10(factor):g}"' in html
     assert '<option value="C">' in html
     assert attributes(data_do=do.SaveAnimation("exaggeration")) in html
+    assert attributes(data_do=do.SaveAnimation("exaggeration", ".mp4")) in html
     bar.do(do.Input.CHOOSE_TRACK("C"))
     html = bar.part.render(bar.context.picture)["playback"]
     assert 'aria-label="Position of C"' in html
@@ -212,6 +213,7 @@ def test_a_program_is_played_to_its_worst_block_with_line_error_and_cause():
     lengths = np.linalg.norm(picture.path.error_um, axis=1)
     assert player.step_of("program") == int(np.argmax(lengths))
     html = bar.part.render(picture)["playback"]
+    assert attributes(data_do=do.SaveAnimation("program")) in html
     line = int(picture.path.of.line[np.argmax(lengths)])
     assert f"line {line}</span>" in html
     assert PROGRAM_TEXT.splitlines()[line - 1] in html

@@ -166,14 +166,20 @@ def test_files_that_a_page_refuses_or_invents_are_said_or_left():
 
 def test_the_bar_has_an_animation_written_with_its_progress():
     asked = []
-    write = Services(draw_animation=lambda _, motion, job: asked.append(motion) or b"RIFF")
+    write = Services(draw_animation=lambda *about: asked.append(about[:-1]) or b"RIFF")
     window = Alone(FilesDialog, STATE, services=write)
     state = window.do(do.SaveAnimation("rotation"))
     wait(window.part)
-    assert (asked, state.page.window) == (["rotation"], "files")
+    assert ([about[1:] for about in asked], state.page.window) == ([("rotation", ".webp")], "files")
     ((name, content),) = window.saved
     assert name.endswith("_rotation.webp")
     assert content == b"RIFF"
+    # a story is that of the review, not of the step that is shown
+    window.context.story_state = window.context.store.state.zeroed()
+    window.do(do.SaveAnimation("story", ".mp4"))
+    wait(window.part)
+    assert asked[-1][0].state.amplitudes == window.context.store.state.amplitudes
+    assert window.saved[-1][0].endswith("_story.mp4")
 
 
 def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_own():

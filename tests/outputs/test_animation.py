@@ -2,24 +2,29 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import imageio_ffmpeg
 import numpy as np
 import pytest
+from matplotlib.text import Text
 from PIL import Image
 
 from products import first
 from warpspace import load_scene
+from warpspace.analysis.description import ignore_progress
 from warpspace.exceptions import OptionError, OutputError
+from warpspace.machine.axes import parameter
 from warpspace.outputs.animation import (
     AnimationSettings,
-    draw_frame,
+    build_frames,
     one_round,
     shared_palette,
     sweep_factor,
     write_animation,
 )
 from warpspace.outputs.drawing.settings import FigureSettings
+from warpspace.parts.program import Program
 
 
 def decoded(path):
@@ -54,7 +59,8 @@ def test_a_turn_covers_the_circle_of_every_point():
 @pytest.mark.render
 def test_camera_and_scale_stand_still(renderer):
     scene = load_scene("dvf5000_first")
-    first, middle = (draw_frame(scene, SMALL, number).maps[0] for number in (0, 2))
+    frames = build_frames(scene, SMALL)
+    first, middle = (frames[number]().maps[0] for number in (0, 2))
     assert first.picture.exaggeration == 1.0
     assert middle.picture.exaggeration == 1000.0
     assert first.picture.scale == middle.picture.scale
@@ -99,6 +105,54 @@ def test_nothing_to_turn(tmp_path):
     path.write_text('title = "three"\n[machine]\nchain = "wFXYZt"\n')
     with pytest.raises(OptionError, match="no trace to animate"):
         one_round(load_scene(path))
+
+
+def words(drawing):
+    return [text.get_text() for text in drawing.figure.findobj(Text)]
+
+
+@pytest.mark.render
+def test_a_program_states_line_error_and_cause_in_each_picture(renderer):
+    scene = load_scene("part_on_dvf5000")
+    result = Program().run(scene, ignore_progress)
+    worst, count = result.worst[0], len(result.path.line)
+    figure = replace(SMALL.figure, size=(800, 600))
+    frames = build_frames(scene, AnimationSettings("program", count, 8.0, figure))
+    drawing = frames[int(np.argmax(result.path.norm_um))]()  # there is one picture of each sample
+    code = [*result.analysis.lines()][worst.line - 1].strip()
+    cause = parameter(max(worst.budget, key=worst.budget.get)).cause
+    assert f"line {worst.line}: {code}" in words(drawing)
+    assert f"|E| {worst.um:.1f} µm, mostly because {cause}" in words(drawing)
+    assert f"{worst.um:.1f} µm" in words(frames[0]())  # max
+
+
+def test_a_program_is_that_of_the_scene():
+    with pytest.raises(OptionError, match="expected a program"):
+        build_frames(load_scene("dvf5000_first"), replace(SMALL, motion="program"))
+
+
+@pytest.mark.render
+def test_the_steps_of_a_story_follow_each_other_with_their_texts(renderer, tmp_path):
+    scene = load_scene("dvf5000_first")
+    figures = [replace(SMALL.figure, component=component) for component in "xy"]
+    steps = [
+        (f"Step {figure.component}\n(note)", "error-map", [scene], figure) for figure in figures
+    ]
+    settings = replace(SMALL, motion="story", steps=steps)
+    frames = build_frames(scene, settings)
+    assert frames[0] is frames[1]  # drawn once
+    assert [frame is frames[0] for frame in frames] == [True, True, False, False]
+    for frame, name in ((frames[0], "x"), (frames[3], "y")):
+        drawing = frame()
+        assert f"Step {name}" in words(drawing)
+        assert drawing.maps[0].picture.component == name
+    write_animation(scene, tmp_path / "story.webp", settings)
+    with Image.open(tmp_path / "story.webp") as film:
+        assert film.n_frames == 2
+        film.load()
+        assert film.info["duration"] == 200
+    with pytest.raises(OptionError, match="no story"):
+        build_frames(scene, replace(settings, steps=()))
 
 
 def test_mp4_without_its_package_says_what_to_install(tmp_path, monkeypatch):

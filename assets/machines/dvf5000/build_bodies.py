@@ -29,6 +29,7 @@ from warpspace.units import Array
 HERE = Path(__file__).parent
 SLOTS = 8
 ABOVE_TOP = 0.3
+BOSS = 2.0  # of a bearing; the bevel of an edge within the face of its wall would show through it
 
 BED = [
     box((-640, 640), (-620, 1250), (-520, -320)),
@@ -43,7 +44,7 @@ TOWERS = [  # bearings of B before and behind the table
     for near, far in ((-490, -385), (385, 490))
     for shape in (
         box((-120, 120), (near, far), (-320, 50)),
-        cylinder(120, (near, far), (0, 50), axis="y"),
+        cylinder(120, (near - BOSS, far + BOSS), (0, 50), axis="y"),
     )
 ]
 SADDLE_X = [
@@ -64,7 +65,7 @@ CRADLE = [
         for near, far in ((-380, -320), (320, 380))
         for shape in (
             box((-100, 100), (near, far), (-205, 50)),
-            cylinder(100, (near, far), (0, 50), axis="y"),
+            cylinder(100, (near - BOSS, far + BOSS), (0, 50), axis="y"),
         )
     ),
     box((-190, 190), (-320, 320), (-205, -130)),

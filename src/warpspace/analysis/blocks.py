@@ -2,10 +2,12 @@
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from markupsafe import escape
+
+from warpspace.units import MICROMETRE, MICRORADIAN
 
 if TYPE_CHECKING:
     from warpspace.units import Array
@@ -39,6 +41,12 @@ class Column:
     def is_number(self) -> bool:
         """True if its cells are right-aligned."""
         return isinstance(self.form, str) and bool(self.form)
+
+    @property
+    def rounded(self) -> "Column":
+        """The column on pages, where errors have one decimal; tables of commands have two."""
+        is_error = self.unit in (MICROMETRE, MICRORADIAN) and self.form in (".2f", "+.2f")
+        return replace(self, form=str(self.form).replace("2", "1")) if is_error else self
 
     def spell(self, value: Any) -> str:
         if value is None:
@@ -79,10 +87,10 @@ class Table:
         """The columns of text and pages."""
         return tuple(column for column in self.columns if column.shows)
 
-    def cells(self) -> list[list[str]]:
+    def cells(self, *, rounded: bool = True) -> list[list[str]]:
+        columns = [column.rounded if rounded else column for column in self.columns]
         return [
-            [c.spell(v) for c, v in zip(self.columns, row, strict=True) if c.shows]
-            for row in self.rows
+            [c.spell(v) for c, v in zip(columns, row, strict=True) if c.shows] for row in self.rows
         ]
 
     def csv_rows(self) -> list[list[Any]]:
@@ -254,12 +262,12 @@ def _bars_html(bars: Bars) -> str:
 
 
 def _bar(panel: Panel, row: int) -> str:
-    numbers = [series.values[row] for series in panel.series]
+    numbers = [(series.values[row], series.form or ".2f") for series in panel.series]
     everything = [abs(v) for series in panel.series for v in series.values if v is not None]
     longest = max((*everything, panel.before or 0.0)) or 1.0
     parts = "".join(
-        f'<div class="bar" style="width:{100.0 * abs(value) / longest:.1f}%">{value:.2f}</div>'
-        for value in numbers
+        f'<div class="bar" style="width:{100.0 * abs(value) / longest:.1f}%">{value:{form}}</div>'
+        for value, form in numbers
         if value is not None
     )
     return f"<td>{parts}</td>"

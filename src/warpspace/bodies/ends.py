@@ -202,7 +202,7 @@ class Head:
 
 
 _SLOTS, _ABOVE_MM = 8, 0.3
-_STEEP = 0.9
+_STEEP, _BOSS = 0.9, 0.04
 
 
 class WorkpieceSide:
@@ -374,7 +374,8 @@ class WorkpieceSide:
             for wall in mirrored_walls(middle, near, thick):
                 self.parts.box(frame, what, wall, about(line[m], half), ends, along=k)
                 start, end = line.copy(), line.copy()
-                start[k], end[k] = wall
+                # a boss: the bevel of an edge within the face of the wall would show through it
+                start[k], end[k] = wall[0] - _BOSS * u, wall[1] + _BOSS * u
                 self.parts.add(frame, what, rod(start, end, half))
         self.bed_mm = bed
         self.half_mm[k], self.half_mm[m] = inner + 1.6 * u, max(depth, 1.3 * u)

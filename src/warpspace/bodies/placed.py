@@ -31,6 +31,15 @@ def load_bodies(machine: Machine) -> tuple[Body, ...]:
     return tuple(body for body in (*bodies, *meshes.values()) if body.frame in frames)
 
 
+def turning_frames(machine: Machine) -> tuple[str, ...]:
+    """List the rotary axes next to the workpiece, or to the tool, and the frame behind them."""
+    for side, end in (("workpiece", "w"), ("tool", "t")):
+        rotary = [axis.name for axis in machine.branch(side) if not axis.is_linear]
+        if rotary:
+            return (*rotary, end)
+    return ()
+
+
 def _error_values(
     errors: ErrorSet, amplitudes: Mapping[str, float], coordinates: Coordinates, direction: str
 ) -> dict[str, float]:

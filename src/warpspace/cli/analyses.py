@@ -156,7 +156,7 @@ def print_blocks(blocks: "Iterable[Block]") -> None:
             if block.title:
                 print_text(block.title)
             if block.rows:
-                print_table(block.visible_columns, block.cells())
+                print_table(block.visible_columns, block.cells(rounded=False))
             elif block.empty:
                 print_text(block.empty)
 

@@ -21,6 +21,7 @@ from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.drawing.player import whole_factor
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.scene_overlays import program_of
 from warpspace.app.panels.panel import Job
 from warpspace.app.state.app_state import START_NODES, start_state
 from warpspace.cli.shared_options import write_text
@@ -34,6 +35,7 @@ from warpspace.outputs.exports.formats import write_export as write
 from warpspace.outputs.figures.registry import figure_kinds
 from warpspace.outputs.file_output import temporary_folder
 from warpspace.outputs.processes import FigureWorker
+from warpspace.parts.program import Program
 from warpspace.picture.comparison import conditions_of_both, scene_change
 from warpspace.picture.model import VIEW_WORDS, VIEWS, ScenePicture, evaluate_picture
 from warpspace.scene.model import Scene
@@ -41,11 +43,11 @@ from warpspace.scene.notes import story
 from warpspace.units import spell
 
 if TYPE_CHECKING:
-    from warpspace.outputs.report.sections import Step
+    from warpspace.outputs.drawing.settings import Step
 
 MAX_RENDERERS = 2  # figures drawn at the same time, all tabs together
 POLL_S = 0.1
-ANIMATION_SIZE, ANIMATION_FRAMES, ANIMATION_FPS = (800, 600), 60, 15.0
+ANIMATION_SIZE = (800, 600)
 MAPS = "warpspace.outputs.charts.result_charts:compensation_maps"
 _renderers = threading.Semaphore(MAX_RENDERERS)
 
@@ -108,25 +110,31 @@ def _figure_of(
     return name, [side.active_scene() for side in sides], settings
 
 
-def draw_animation(picture: "LivePicture", motion: str, job: "Job") -> bytes:
-    """Draw the picture of a page with a motion, as an animated WebP of four seconds."""
-    from warpspace.outputs.animation import AnimationSettings, write_animation
+def draw_animation(picture: "LivePicture", motion: str, ending: str, job: "Job") -> bytes:
+    """Draw the picture of a page with a motion, as an animated WebP or an MP4."""
+    from warpspace.outputs.animation import AnimationSettings, default_frames, write_animation
 
-    _, scenes, figure = _figure_of(picture)
-    if len(scenes) > 1:
-        raise OptionError("an animation shows one machine; draw A or B, not their difference")
+    state, steps, program = picture.drawn_state, list["Step"](), Program()
+    if motion == "story":
+        state = picture.state
+        scene = replace(state.active_scene(), review=file_notes(state))
+        steps = build_story(scene, state.nodes)
+    _, scenes, figure = _figure_of(picture, "error-map")
+    if motion == "program":
+        program = program_of(state, scenes[0])
     factor = whole_factor(picture)
     if motion == "rotation" and not picture.is_rotary:
         factor = picture.state.exaggeration or "auto"  # that of the traces, not of the volume
     figure = replace(figure, exaggeration=factor, size=ANIMATION_SIZE)
-    settings, count = AnimationSettings(motion, ANIMATION_FRAMES, ANIMATION_FPS, figure), [0]
+    frames, fps = default_frames(motion, len(steps))
+    settings, count = AnimationSettings(motion, frames, fps, figure, program, steps), [0]
 
     def report_progress(n_frames: int) -> None:
         count[0] += n_frames
-        job.report_progress(count[0] / ANIMATION_FRAMES)
+        job.report_progress(count[0] / frames)
 
     with _renderer_slot(job), temporary_folder() as folder:
-        target = folder / "animation.webp"
+        target = folder / f"animation{ending}"
         write_animation(scenes[0], target, settings, progress=report_progress)
         return target.read_bytes()
 
@@ -309,7 +317,9 @@ def build_story(scene: "Scene", nodes: int) -> "list[Step]":
             *picture.state.notes,
         )  # fmt: skip
         caption = f"Step {len(steps) + 1} of {len(notes)}: {' '.join(note.text.split())}"
-        caption += f" (note {scene.review.index(note) + 1}; {' · '.join(filter(None, conditions))})"
+        caption += (
+            f"\n(note {scene.review.index(note) + 1}; {' · '.join(filter(None, conditions))})"
+        )
         key, end = (name, settings.component), settings.range_top or 0.0
         ends[key] = max(ends.get(key, 0.0), end)
         steps.append((caption, name, scenes, replace(settings, view=view, dark=False, grid=nodes)))

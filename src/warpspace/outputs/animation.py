@@ -5,6 +5,7 @@ import os
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,43 +13,66 @@ import matplotlib as mpl
 import numpy as np
 from PIL import Image
 
-from warpspace.bodies.placed import PlacedBody, place_bodies
+from warpspace.bodies.placed import PlacedBody, place_bodies, turning_frames
 from warpspace.exceptions import OptionError, OutputError, RenderError, WorkersLostError
-from warpspace.geometry.surfaces import deform
-from warpspace.kinematics.model import Loop
+from warpspace.geometry.colour import component_values
+from warpspace.geometry.surfaces import box_edges, deform
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose
+from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import ANIMATION_FRAMES
-from warpspace.outputs.drawing.map3d import draw_map, fit_map
+from warpspace.outputs.drawing.map3d import GHOST_DASHES, draw_map, draw_split, fit_map
 from warpspace.outputs.drawing.off_screen import fit_projection
-from warpspace.outputs.drawing.settings import SAVE_RC, SIZES, FigureSettings, evaluate_for
-from warpspace.outputs.drawing.sheet import Drawing, map_legend, scene_facts, start_sheet
+from warpspace.outputs.drawing.settings import SAVE_RC, SIZES, FigureSettings, Step, evaluate_for
+from warpspace.outputs.drawing.sheet import (
+    Drawing,
+    line_entry,
+    map_legend,
+    scene_facts,
+    start_sheet,
+)
 from warpspace.outputs.figure_files import figure_bytes
-from warpspace.outputs.figures.machine_figures import draw_bodies
+from warpspace.outputs.figures.machine_figures import draw_bodies, trace_entry
 from warpspace.outputs.figures.maps import draw_statistics, isoline_words
+from warpspace.outputs.figures.registry import draw_figure
 from warpspace.outputs.file_output import check_target, write_atomically
 from warpspace.outputs.processes import ProcessPool
-from warpspace.picture.model import choose_exaggeration, choose_scale, evaluate_picture
+from warpspace.parts.program import Program, ToolPath, explain_sample, trace_program
+from warpspace.picture.formatting import quantity_words, spell_cause
+from warpspace.picture.model import (
+    ScenePicture,
+    choose_exaggeration,
+    choose_scale,
+    evaluate_picture,
+)
 from warpspace.picture.traces import TraceLine, evaluate_traces
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
-from warpspace.units import Array, spell, spell_short
+from warpspace.units import MICROMETRE, Array, spell, spell_fixed, spell_short
 
-MOTIONS = ("exaggeration", "rotation")
+MOTIONS = ("exaggeration", "rotation", "program", "story")
 MIN_FRAMES, MAX_FRAMES = ANIMATION_FRAMES
 MAX_PIXELS = 1_500_000_000  # of all pictures together
 _TRACE_SAMPLES = 241
+STEP_S = 6  # of a story
+MOST_LETTERS = 60  # of a line of the program
+Frame = Callable[[], Drawing]
 
 
 @dataclass(frozen=True, slots=True)
 class AnimationSettings:
     """Options of an animation."""
 
-    # "exaggeration" (from true scale to the display factor and back) or "rotation" (one turn of the
-    # rotary axis next to the workpiece)
+    # "exaggeration" (from true scale to the display factor and back), "rotation" (one turn of the
+    # rotary axis next to the workpiece), "program" (along its path) or "story" (step by step)
     motion: str = "exaggeration"
     frames: int = 48  # pictures of one round; the last leads back to the first
     fps: float = 15.0  # pictures a second
     # component, display factor, view, size, loop, grid and theme
     figure: FigureSettings = field(default_factory=lambda: FigureSettings(size=(960, 720)))
+    program: Program = field(default_factory=Program)  # by default that of the scene
+    steps: Sequence[Step] = ()  # of the story
 
     def __post_init__(self) -> None:
         if self.motion not in MOTIONS:
@@ -65,11 +89,35 @@ class AnimationSettings:
             )
 
 
-def draw_frame(scene: Scene, settings: AnimationSettings, number: int) -> Drawing:
-    phase = number / settings.frames
-    if settings.motion == "rotation":
-        return _rotation_frame(scene, settings.figure, phase)
-    return _exaggeration_frame(scene, settings.figure, phase)
+def default_frames(motion: str, n_steps: int = 0) -> tuple[int, float]:
+    """Return the number of pictures, and of pictures a second; each step of a story stays."""
+    return {"program": (160, 8.0), "story": (min(STEP_S * max(n_steps, 1), MAX_FRAMES), 1.0)}.get(
+        motion, (48, 15.0)
+    )
+
+
+def build_frames(scene: Scene, settings: AnimationSettings) -> list[Frame]:
+    """Build the functions that draw the pictures; the same one where a picture stays."""
+    figure, shares = settings.figure, np.arange(settings.frames) / settings.frames
+    if settings.motion == "program":
+        return _program_frames(scene, settings)
+    if settings.motion == "story":
+        if not settings.steps:
+            raise OptionError(
+                f"{scene.name}: no story to animate; expected notes with a place in it"
+            )
+        drawn = [
+            partial(
+                draw_figure,
+                name,
+                scenes,
+                replace(step, size=figure.size, caption=text.partition("\n")[0]),
+            )
+            for text, name, scenes, step in settings.steps
+        ]
+        return [drawn[int(share * len(drawn))] for share in shares]
+    draw = _rotation_frame if settings.motion == "rotation" else _exaggeration_frame
+    return [partial(draw, scene, figure, float(share)) for share in shares]
 
 
 def sweep_factor(top: float, phase: float) -> float:
@@ -156,6 +204,84 @@ def _rotation_frame(scene: Scene, figure: FigureSettings, phase: float) -> Drawi
     return sheet.finish(factor)
 
 
+def _program_frames(scene: Scene, settings: AnimationSettings) -> list[Frame]:
+    """Build the pictures along a program, with the same number of samples between them."""
+    analysis = settings.program.of_scene(scene)
+    program, lines = analysis.read(scene), [*analysis.lines()]
+    path = trace_program(program)
+    samples = np.linspace(0, len(path.line) - 1, settings.frames).astype(int).tolist()
+    picture = evaluate_for(settings.figure, scene)
+    corners = [
+        _box_corners(part.vertices_mm)
+        for sample in samples
+        for part in _turning_bodies(picture, path, sample)
+    ]
+    reach = np.concatenate([np.zeros((0, 3)), *corners])
+    stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
+    pose = np.asarray(branch_pose(scene.model, "workpiece", stand))
+    tip, error_um = transforms.apply(pose, path.tip_mm), path.error_um @ pose[:3, :3].T
+    in_r = replace(path, tip_mm=tip, error_um=error_um, uncertainty=None)
+    frames: list[Frame] = []
+    for sample in samples:
+        point = explain_sample(program, path, sample)
+        code = lines[point.line - 1].strip()[:MOST_LETTERS] if point.line <= len(lines) else ""
+        causes = [spell_cause(key, um / point.um) for key, um in point.budget.items() if point.um]
+        error = ", ".join([f"|E| {spell_fixed(point.um)} {MICROMETRE}", *causes[:1]])
+        figure = replace(settings.figure, caption=f"line {point.line}: {code}\n{error}")
+        frames.append(partial(_program_frame, scene, figure, in_r, sample, reach))
+    return frames
+
+
+def _turning_bodies(picture: ScenePicture, path: ToolPath, sample: int) -> tuple[PlacedBody, ...]:
+    """Place the rotary axes at a sample; the path is drawn where the linear axes stand."""
+    scene = picture.scene
+    positions = {name: at for name, at in path.axes_at(sample).items() if not is_linear(name)}
+    turning = turning_frames(scene.machine)
+    return place_bodies(scene, picture.view, picture.exaggeration, turning, positions=positions)
+
+
+def _program_frame(
+    scene: Scene, figure: FigureSettings, path: ToolPath, sample: int, reach_mm: Array
+) -> Drawing:
+    picture = evaluate_for(figure, scene)
+    factor, values = picture.exaggeration, component_values(path.error_um, figure.component)
+    legend = [
+        line_entry("nominal volume", lambda theme: theme.ghost, dashes=GHOST_DASHES),
+        line_entry("nominal path", lambda theme: theme.muted, SIZES.thin),
+        trace_entry("actual path, exaggerated, coloured by its error"),
+    ]
+    title, facts = f"Path of the program: {scene.title}", scene_facts(picture, factor)
+    sheet = start_sheet("program", figure, title, facts, [scene], legend, exact=True)
+    canvas, nodes = sheet.canvas, picture.grid.nominal_mm.reshape(-1, 3)
+    actual_mm = deform(path.tip_mm, path.error_um, factor)
+    side, (x_left, bottom, right, top) = canvas.px(20.0), sheet.content
+    inner = (x_left + side, bottom + side, right - side, top - side)
+    reach = np.concatenate([nodes, path.tip_mm, actual_mm, reach_mm])
+    camera = fit_projection(figure.view, reach, inner)
+    bodies = _turning_bodies(picture, path, sample)
+    machine = draw_bodies(canvas, bodies, camera, nominal=False)
+    edges = (nodes[edge] for edge in box_edges(picture.shape))
+    style = {"colour": canvas.theme.ghost, "dashes": GHOST_DASHES, "zorder": 2.2}
+    draw_split(canvas, edges, camera, machine, alpha=(1.0, 0.5), **style)
+    ends = np.flatnonzero(path.step_mm.any(axis=1))
+    segments = np.stack([ends - 1, ends], axis=1)
+    nominal, actual = camera.project(path.tip_mm)[segments], camera.project(actual_mm)
+    canvas.lines([*nominal], width=SIZES.thin, colour=canvas.theme.muted, zorder=3.0)
+    colours = picture.scale.colours(values[segments].mean(axis=1)) / 255.0
+    canvas.lines([*actual[segments]], width=3.4, colour=colours, zorder=3.5)
+    canvas.disc(actual[sample], 6.0, canvas.theme.accent)
+    marks = [("max", float(values.max())), ("mean", float(values.mean()))]
+    rows = [(name, f"{spell_fixed(um)} {MICROMETRE}") for name, um in marks]
+    heading, bars = quantity_words(figure.component), (camera.px_per_mm, factor)
+    sheet.draw_panel(picture.scale, heading, marks, rows, bars)
+    return sheet.finish(factor)
+
+
+def _box_corners(points_mm: Array) -> Array:
+    x, y, z = np.stack([points_mm.min(axis=0), points_mm.max(axis=0)], -1)
+    return np.stack(np.meshgrid(x, y, z), -1).reshape(-1, 3)
+
+
 def _swept(part: PlacedBody) -> Array:
     points = part.nominal_mm
     low, high = points.min(axis=0), points.max(axis=0)
@@ -184,9 +310,8 @@ def write_animation(
     ending = target.suffix.lower()
     encoder = _find_encoder() if ending == ".mp4" else ""
     about = f"warpspace {__version__}; scene={scene.name}; motion={settings.motion}"
-    pictures = [
-        Image.open(io.BytesIO(data)).convert("RGB") for data in _pictures(scene, settings, progress)
-    ]
+    frames = build_frames(scene, settings)
+    pictures = [Image.open(io.BytesIO(data)).convert("RGB") for data in _pictures(frames, progress)]
     with write_atomically(target, overwrite=overwrite) as temporary:
         if ending == ".mp4":
             _write_video(pictures, temporary, encoder, settings, about)
@@ -194,15 +319,13 @@ def write_animation(
             _write_images(pictures, temporary, ending, settings, about)
 
 
-def _pictures(
-    scene: Scene, settings: AnimationSettings, progress: Progress | None
-) -> Iterator[bytes]:
-    workers = max(1, min(os.cpu_count() or 1, MAX_WORKERS, settings.frames))
-    pool = ProcessPool(workers)
+def _pictures(frames: Sequence[Frame], progress: Progress | None) -> Iterator[bytes]:
+    different = dict.fromkeys(frames)
+    pool = ProcessPool(max(1, min(os.cpu_count() or 1, MAX_WORKERS, len(different))))
     try:
-        tasks = [pool.submit(_draw, scene, settings, number) for number in range(settings.frames)]
-        for task in tasks:
-            yield task.result()
+        tasks = {frame: pool.submit(_draw, frame) for frame in different}
+        for frame in frames:
+            yield tasks[frame].result()
             if progress is not None:
                 progress(1)
     except WorkersLostError:
@@ -213,9 +336,9 @@ def _pictures(
         pool.kill()
 
 
-def _draw(scene: Scene, settings: AnimationSettings, number: int) -> bytes:
+def _draw(frame: Frame) -> bytes:
     with mpl.rc_context(SAVE_RC):
-        drawing = draw_frame(scene, settings, number)
+        drawing = frame()
     return figure_bytes(drawing, "png")
 
 

@@ -17,7 +17,7 @@ from functools import cached_property
 from hashlib import sha256
 from io import StringIO
 from math import tau
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -249,6 +249,20 @@ class PathPoint:
     expanded_uncertainty: ExpandedUncertainty[float | None]
 
 
+def explain_sample(program: ParsedProgram, path: ToolPath, sample: int) -> PathPoint:
+    scene, axes = program.scene, path.axes_at(sample)
+    view = scene.view(Loop.RELATIVE, "workpiece")
+    length = float(program.length_mm[path.move[sample]])
+    parts = explain(with_length(scene.model, length), scene.errors, axes, view).contributions
+    ranked = sorted(parts, key=lambda part: -part.along_um)
+    u95 = ExpandedUncertainty[float | None]()
+    if path.uncertainty:
+        u95["u95_um"] = path.uncertainty.u95_at(sample)
+    line, um = int(path.line[sample]), float(path.norm_um[sample])
+    budget = {part.key: part.along_um for part in ranked}
+    return PathPoint(line, um, axes, path.error_um[sample], budget, u95)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Program(ControlSettings, Analysis):
     """Evaluate the errors along the path of a program on SCENE.
@@ -276,33 +290,27 @@ class Program(ControlSettings, Analysis):
         file = self.file or ""
         return program_lines(file) if self.text is None else StringIO(self.text, None)
 
+    def of_scene(self, scene: Scene) -> "Program":
+        """Return the program itself, or that of the scene where none is stated."""
+        if self.file is not None:
+            return self
+        path, tcp = scene.part.path("program"), cast("Any", scene.part.tcp or self.tcp)
+        if path is None:
+            raise OptionError("{file} is missing; expected a program")
+        return replace(self, file=path, tcp=tcp)
+
+    def read(self, scene: Scene) -> ParsedProgram:
+        return read_program(scene, self.lines(), self, self.file or "")
+
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "ProgramResult":
         if self.file is None:
-            path = scene.part.path("program")
-            if path is None:
-                raise OptionError("{file} is missing; expected a program")
-            tcp: Any = scene.part.tcp or self.tcp
-            return replace(self, file=path, tcp=tcp).run(scene, watch)
-        program = read_program(scene, self.lines(), self, self.file)
+            return self.of_scene(scene).run(scene, watch)
+        program = self.read(scene)
         watch(0.3)
         path = trace_program(program)
         watch(0.9)
         order = np.argsort(-path.norm_um, kind="stable")
         worst = order[np.sort(np.unique(path.line[order], return_index=True)[1])[:WORST]]
-
-        def explain_sample(sample: int) -> PathPoint:
-            axes, length = path.axes_at(sample), float(program.length_mm[path.move[sample]])
-            view = scene.view(Loop.RELATIVE, "workpiece")
-            model = with_length(scene.model, length)
-            parts = explain(model, scene.errors, axes, view).contributions
-            ranked = sorted(parts, key=lambda part: -part.along_um)
-            u95 = ExpandedUncertainty[float | None]()
-            if path.uncertainty:
-                u95["u95_um"] = path.uncertainty.u95_at(sample)
-            line, um = int(path.line[sample]), float(path.norm_um[sample])
-            budget = {part.key: part.along_um for part in ranked}
-            return PathPoint(line, um, axes, path.error_um[sample], budget, u95)
-
         ends = np.flatnonzero(path.line == self.at_line)
         if self.at_line and not len(ends):
             lines = np.unique(path.line)
@@ -318,8 +326,8 @@ class Program(ControlSettings, Analysis):
             deviation=deviation,
             along=along,
             across=across,
-            worst=[explain_sample(sample) for sample in worst],
-            line=explain_sample(ends[-1]) if len(ends) else None,
+            worst=[explain_sample(program, path, sample) for sample in worst],
+            line=explain_sample(program, path, ends[-1]) if len(ends) else None,
             program=program,
             path=path,
             analysis=self,

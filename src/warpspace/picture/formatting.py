@@ -6,7 +6,13 @@ from typing import SupportsFloat
 from warpspace.analysis.loop_parameters import loop_axes
 from warpspace.analysis.uncertainty.propagation import FieldUncertainty, plus_minus
 from warpspace.kinematics.model import Convention, Loop, Model
-from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection, is_linear, is_rotary
+from warpspace.machine.axes import (
+    DIRECTION_WORDS,
+    TravelDirection,
+    is_linear,
+    is_rotary,
+    parameter,
+)
 from warpspace.machine.errors import ToleranceSet
 from warpspace.scene.model import Scene
 from warpspace.units import MINUS, THIN_SPACE, Array, spell_short
@@ -14,6 +20,12 @@ from warpspace.units import MINUS, THIN_SPACE, Array, spell_short
 IN_R = "in R"  # prefix of a point in the machine frame
 SEPARATOR = " · "
 _DIGITS = 6  # decimals of a position in a command: a nanometre
+MOSTLY = 0.5  # share of an error above which its largest contribution is most of it
+
+
+def spell_cause(key: str, share: float) -> str:
+    """Spell the largest contribution to an error: ``mostly because Z is not square to Y``."""
+    return f"{'mostly' if share > MOSTLY else 'partly'} because {parameter(key).cause}"
 
 
 def spell_coordinate(value: SupportsFloat) -> str:

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 from warpspace import load_scene
 from warpspace.analysis import Analysis, Quantity, Result, option, register, unregister
-from warpspace.analysis.blocks import Bars, Column, Histogram, Lines, Table
+from warpspace.analysis.blocks import Bars, Column, Histogram, Lines, Table, table_html
 from warpspace.analysis.description import ExpandedUncertainty, ignore_progress, to_json
 from warpspace.analysis.options import options_of
 from warpspace.analysis.registry import TASKS, entries, first_line
@@ -87,6 +87,14 @@ def test_every_option_has_help_and_a_range_it_keeps(entry):
                 kind(**{one.name: float("nan")})
 
 
+def test_errors_have_two_decimals_in_tables_of_commands_and_one_on_pages():
+    heads = Column("|E|", ".2f", "µm"), Column("B − A", "+.2f", "µrad"), Column("share", ".2f", "%")
+    table = Table(heads, [(36.05, -0.26, 12.34), (0.04, 1.0, 0.04)])
+    assert table.cells(rounded=False) == [["36.05", "-0.26", "12.34"], ["0.04", "+1.00", "0.04"]]
+    assert table.cells() == [["36.0", "-0.3", "12.34"], ["0.0", "+1.0", "0.04"]]
+    assert '<td class="number">36.0</td>' in table_html(table)
+
+
 @EVERY
 @pytest.mark.parametrize("scene", SCENES)
 def test_text_page_and_json_say_the_result(entry, scene, capsys):
@@ -106,9 +114,9 @@ def test_text_page_and_json_say_the_result(entry, scene, capsys):
     assert max(map(len, text.splitlines())) <= 80
     page = result._repr_html_()
     for table in result.blocks_of(Table):
-        for cell in filter(None, table.cells()[0] if table.rows else ()):
-            assert cell.split()[0] in text
-            assert cell.split()[0] in page
+        for cells, output in ((table.cells(rounded=False), text), (table.cells(), page)):
+            for cell in filter(None, cells[0] if table.rows else ()):
+                assert cell.split()[0] in output
     assert kind.has_chart == any(map(result.blocks_of, (Bars, Lines, Histogram)))
     assert kind.has_table == (result.file_table() is not None)
     assert bool(kind.makes_scenes) >= bool(result.changes())

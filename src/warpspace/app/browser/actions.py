@@ -20,7 +20,7 @@ Pixels = Annotated[int, Meta(ge=0, le=999_999)]
 Index = Annotated[int, Meta(ge=0, le=9_999_999)]
 Name = Annotated[str, Meta(max_length=160)]
 Text = Annotated[str, Meta(max_length=LONGEST_VALUE)]
-Motion: TypeAlias = Literal["exaggeration", "rotation"]
+Motion: TypeAlias = Literal["exaggeration", "rotation", "program", "story"]
 LongText = Annotated[str, Meta(max_length=15_500_000)]
 
 
@@ -209,6 +209,7 @@ class Scrub(Action):
 
 class SaveAnimation(Action):
     motion: Motion
+    ending: Literal[".webp", ".mp4"] = ".webp"
 
 
 class OpenSection(Action):

@@ -101,6 +101,9 @@
       return { x, y, w: node.offsetWidth, h: node.offsetHeight };
     });
   const ANGLES = [0, 25, -25, 50, -50, 80, -80, 120, -120, 160, -160].map(degrees => degrees * Math.PI / 180);
+  // a name of an axis that would overlap is moved along it, outwards, or between its numbers
+  const MOVES = [...Array(13)].flatMap((_, k) => [...Array(33)].map((_, n) => [5 * n - 80, 16 - 4 * k]))
+    .sort((a, b) => Math.hypot(...a) - Math.hypot(...b));
   const FAR = [20, 34, 52, 76], BESIDE = [...FAR, 110, 150, 200, 260];
 
   const drawPointLabels = (camera, world, rect) => {
@@ -121,19 +124,17 @@
       if (p.depth <= 0) continue;
       const long = Math.hypot(p.x - foot.x, p.y - foot.y);
       const [u, v] = long > 1 ? [(p.x - foot.x) / long, (p.y - foot.y) / long] : [0, 1];
-      const w = widthOf(text, kind === "axis"), h = 16;
+      const w = widthOf(text, kind === "axis") - 6, h = 15;
       const reach = Math.abs(u) * w / 2 + Math.abs(v) * h / 2;
       const away = 3 + reach + (kind === "axis" ? beyond.get(axis) ?? 0 : 0);
       if (kind === "tick") beyond.set(axis, Math.max(beyond.get(axis) ?? 0, 2 * reach + 2));
-      // a name that would overlap is moved along its axis and outwards
-      for (const along of kind === "axis" ? [0, 20, -20, 40, -40, 60, -60, 80, -80] : [0])
-        for (const outwards of kind === "axis" ? [0, 14] : [0]) {
-          const box = { x: p.x + u * (away + outwards) - v * along - w / 2,
-            y: p.y + v * (away + outwards) + u * along - h / 2, w, h };
-          if (placed.at(-1)?.label === text + axis) continue;
-          if (fits(box) && !used.some(other => overlaps(box, other)) && !touches(shape, box))
-            put({ text, kind, label: text + axis }, box);
-        }
+      for (const [along, outwards] of kind === "axis" ? MOVES : [[0, 0]]) {
+        const box = { x: p.x + u * (away + outwards) - v * along - w / 2,
+          y: p.y + v * (away + outwards) + u * along - h / 2, w, h };
+        if (!fits(box) || used.some(other => overlaps(box, other)) || touches(shape, box)) continue;
+        put({ text, kind }, box);
+        break;
+      }
     }
     const depth = state.corners.reduce((sum, corner) => sum + at(corner).depth, 0) / (state.corners.length || 1);
     for (const { text: label, at: point, kind } of state.marks) {

@@ -28,7 +28,7 @@ class Services:
 
     # (picture, name of a figure or "" for that of the coloured quantity, event)
     draw_figure: Draw = _nobody
-    # (picture, "exaggeration" or "rotation", progress callback); returns an animated WebP
+    # (picture, motion, ".webp" or ".mp4", progress callback)
     draw_animation: Draw = _nobody
     # (picture, pixels of a page [height, width, 4], its camera, event)
     draw_view: Draw = _nobody

@@ -8,7 +8,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import drawn_field
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_positions
-from warpspace.bodies.placed import PlacedBody, place_bodies
+from warpspace.bodies.placed import PlacedBody, place_bodies, turning_frames
 from warpspace.geometry.surfaces import deform
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop, complete_coordinates
@@ -40,7 +40,7 @@ def drawn_bodies(
     positions, _ = standing(state, turned)
     factor = picture.exaggeration if state.machine.bent and not nominal else 0.0
     is_whole = nominal or (state.machine.shown and not state.shows_rotary)
-    only = None if is_whole else _turning_frames(state)
+    only = None if is_whole else turning_frames(state.scene.machine)
     return place_bodies(
         scene, state.view(), factor, only, amplitudes=state.active, positions=positions
     )
@@ -57,23 +57,14 @@ def tool_point(picture: LivePicture) -> tuple[Array, Array]:
 # --- The animated axis, its traced points, and the selected trace ---------------------------------
 
 
-def _turning_frames(state: AppState) -> tuple[str, ...]:
-    """List the rotary axes next to the workpiece, or to the tool, and the frame behind them."""
-    for side, end in (("workpiece", "w"), ("tool", "t")):
-        rotary = [axis.name for axis in state.scene.machine.branch(side) if not axis.is_linear]
-        if rotary:
-            return (*rotary, end)
-    return ()
-
-
 def rotary_axes(state: AppState) -> tuple[str, ...]:
     """List the rotary axes that are drawn: of the workpiece side, or else of the tool side."""
-    return _turning_frames(state)[:-1]
+    return turning_frames(state.scene.machine)[:-1]
 
 
 def played_axis(state: AppState) -> str | None:
     """Return the rotary axis next to the workpiece, or to the tool; None where there is none."""
-    return next(iter(_turning_frames(state)[-2:]), None)
+    return next(iter(turning_frames(state.scene.machine)[-2:]), None)
 
 
 def points_on_traces(picture: LivePicture, position: Mapping[str, float]) -> tuple[Array, Array]:

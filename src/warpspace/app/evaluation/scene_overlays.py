@@ -22,7 +22,6 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.parts import workpiece
-from warpspace.parts.gcode.interpreter import read_program
 from warpspace.parts.program import Program, ToolPath, trace_program
 from warpspace.parts.workpiece import ActualPoints, Workpiece
 from warpspace.scene.model import Scene
@@ -131,19 +130,27 @@ def moved_place(part: Workpiece, stand: Array) -> tuple[float, ...]:
 
 def path_overlay(state: AppState) -> SceneOverlay[ToolPath] | None:
     """Build the path of the program; None where there is none, or it cannot be traced."""
-    text, option_texts = state.part.program, option_values(state, Program.name) | {"at_line": ""}
+    text = state.part.program
     if text is None:
         return None
 
     def trace(scene: Scene) -> SceneOverlay[ToolPath]:
-        program = read_form(Program, Program.options(), option_texts, scene)
-        read = read_program(scene, text.splitlines(), program, state.part.program_name)
-        path = trace_program(read)
+        path = trace_program(program_of(state, scene).read(scene))
         made = ActualPoints(path.tip_mm, path.coordinates, path.error_um, path.outside)
         ends = np.flatnonzero(path.step_mm.any(axis=1))
         return _respond(scene, path, made, np.stack([ends - 1, ends], axis=1))
 
-    return _cached_overlay(state, (text, *sorted(option_texts.items())), trace)
+    return _cached_overlay(state, (text, *sorted(_program_options(state).items())), trace)
+
+
+def _program_options(state: AppState) -> Mapping[str, str]:
+    return option_values(state, Program.name) | {"at_line": ""}
+
+
+def program_of(state: AppState, scene: Scene) -> Program:
+    """Build the program of a state, with its options."""
+    program = read_form(Program, Program.options(), _program_options(state), scene)
+    return replace(program, file=state.part.program_name, text=state.part.program)
 
 
 def chosen_test(state: AppState) -> type[BenchTest] | None:

@@ -181,10 +181,15 @@ class FilesDialog(JobDialog):
 
     @on(do.SaveAnimation)
     def save_animation(self, state: AppState, action: do.SaveAnimation) -> AppState:
-        draw, motion = self.context.services.draw_animation, action.motion
-        write = partial(self.make, "Animation", f"_{motion}.webp",
-                        lambda picture, job: draw(picture, motion, job))  # fmt: skip
-        self.context.call_soon(write)
+        draw, motion, ending = self.context.services.draw_animation, action.motion, action.ending
+        review = self.context.store.state  # not the step of a story that is shown
+
+        def write(picture: LivePicture, job: Job) -> bytes:
+            if motion == "story":
+                picture = PLAIN.evaluate(without_table(review))
+            return draw(picture, motion, ending, job)
+
+        self.context.call_soon(partial(self.make, "Animation", f"_{motion}{ending}", write))
         return replace(state, page=replace(state.page, window=self.name))  # its progress
 
     @on(do.Signal.SAVE_VIEW, later=True)

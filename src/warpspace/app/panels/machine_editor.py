@@ -104,12 +104,11 @@ class EditorSection(panel.Section):
     name, task, title = "editor", "machine", "Edit the machine"
     sentence = "Axes, their order, offsets and travels; or another machine to start from"
 
-    _refused = ("", "")  # rejected chain and error message
+    _problem = ""  # of a rejected chain
 
     def body(self, picture: LivePicture) -> Markup:
         scene = picture.state.scene
         chain, tables = scene.machine.chain, machine_edits.tables_of(scene)
-        typed, problem = self._refused if self._refused[1] else (str(chain), "")
         numbers = {
             quantity: {frame: list(map(spell_typed, row)) for frame, row in table.items()}
             for quantity, table in tables.items()
@@ -122,18 +121,24 @@ class EditorSection(panel.Section):
         }
         bodies = {frame: _source(source) for frame, source in tables["mesh"].items()}
         return HTML.editor(
-            typed, problem, scene.machine, numbers, machine_edits.UNITS, guides, bodies, scene.notes
+            str(chain),
+            self._problem,
+            scene.machine,
+            numbers,
+            machine_edits.UNITS,
+            guides,
+            bodies,
+            scene.notes,
         )
 
     @panel.on(do.EditMachine)
     def edit(self, state: AppState, action: do.EditMachine) -> AppState:
-        self._refused = ("", "")
+        self._problem = ""
         word = action.edit if action.value is None else f"{action.edit} {action.value}"
         changed = machine_edits.with_word(state, word)
         notes = changed.notes[len(state.notes) :]
         if action.edit == "chain" and notes and changed.scene is state.scene:
-            message = "\n".join(notes).removesuffix(f"; {machine_edits.UNCHANGED}")
-            self._refused = (action.value or "")[:200], message
+            self._problem = "\n".join(notes)
             self.context.call_soon(self.rerender)
             return state
         return changed

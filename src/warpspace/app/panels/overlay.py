@@ -26,7 +26,6 @@ from warpspace.app.evaluation.point_explanation import explain_point, pick, pick
 from warpspace.app.panels.conventions import with_travel
 from warpspace.app.panels.design import allowed_words
 from warpspace.app.panels.panel import Context, Panel, Refresh, on, setting, with_section
-from warpspace.app.panels.playback import share_words
 from warpspace.app.state.app_state import COMPARISON_VIEWS, COMPONENT_NAMES, NOBODY, AppState, Side
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import DRAWINGS, QUANTITIES, SURFACES, slice_positions
@@ -34,7 +33,7 @@ from warpspace.app.state.tree import leaves, put
 from warpspace.geometry.surfaces import corners
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection, is_linear, parameter
-from warpspace.picture.formatting import spell_factor
+from warpspace.picture.formatting import spell_cause, spell_factor
 from warpspace.picture.map_mesh import isoline_labels
 from warpspace.units import Array, spell_short
 
@@ -110,8 +109,7 @@ def cause_words(picture: LivePicture) -> str:
     if not worst.ranked or not worst.length_um:
         return ""
     first = worst.ranked[0]
-    share = share_words(first.along_um / worst.length_um)
-    return f", {share} because {parameter(first.key).cause}"
+    return f", {spell_cause(first.key, first.along_um / worst.length_um)}"
 
 
 class OverlayPanel(Panel):

@@ -22,17 +22,11 @@ from warpspace.app.evaluation.machine_bodies import played_axis
 from warpspace.app.panels.panel import Context, Panel, Refresh, on
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.typed_numbers import read_typed
-from warpspace.machine.axes import parameter
-from warpspace.picture.formatting import spell_factor
+from warpspace.picture.formatting import spell_cause, spell_factor
 from warpspace.units import MINUS
 
 HTML = Templates("playback")
 MOST_LETTERS = 60  # of a line of the program
-MOSTLY = 0.5  # share of an error above which its largest contribution is most of it
-
-
-def share_words(share: float) -> str:
-    return "mostly" if share > MOSTLY else "partly"
 
 
 class PlaybackPanel(Panel):
@@ -56,7 +50,9 @@ class PlaybackPanel(Panel):
         names = axes if chosen in axes and picture.is_rotary else [chosen]
         speeds = {f"{s:.2g}": f"{AXIS_DEG_S * s:g} °/s" if chosen in axes else f"{s:.1g} ×"
                   for s in SPEEDS}  # fmt: skip
-        motions: dict[str | None, do.Motion] = {played_axis(state): "rotation"}
+        motions: dict[str | None, do.Motion] = {
+            played_axis(state): "rotation", PROGRAM: "program", STORY: "story"
+        }  # fmt: skip
         if not state.shows_rotary:
             motions[EXAGGERATION] = "exaggeration"
         return {"playback": HTML.bar(
@@ -144,6 +140,6 @@ def _program_words(picture: LivePicture, sample: int) -> tuple[str, str, str]:
         amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
         along = amplitudes * (path.response[:, 3 * sample : 3 * sample + 3] @ error) / length
         first = int(np.argmax(np.abs(along)))
-        cause = parameter([*state.amplitudes][first]).cause
-        words += f", {share_words(float(along[first]) / length)} because {cause}"
+        cause = spell_cause([*state.amplitudes][first], float(along[first]) / length)
+        words += f", {cause}"
     return f"line {line}", code, words

@@ -43,7 +43,6 @@ if TYPE_CHECKING:
 SERVICES = "warpspace.cli.services"
 MOVING = (".gif", ".webp", ".mp4")
 SIZE, MOVING_SIZE = (1600, 1200), (960, 720)
-FRAMES, FPS = 48, 15.0
 formats.register_format(
     formats.ExportFormat(
         ".html",
@@ -144,12 +143,12 @@ def view(
 )
 @choice_option(
     "--motion",
-    ("exaggeration", "rotation"),
-    "Motion: from true scale to the display factor and back, or one turn of the rotary"
-    " table.  [exaggeration]",
+    ("exaggeration", "rotation", "program", "story"),
+    "Motion: from true scale to the display factor and back, one turn of the rotary table, along"
+    " the program of the scene, or the story of its notes.  [exaggeration]",
 )
-@click.option("--frames", type=int, help=f"Frames of one cycle.  [{FRAMES}]")
-@click.option("--fps", type=float, help=f"Frames per second.  [{FPS:g}]")
+@click.option("--frames", type=int, help="Number of frames.  [48; program 160; story 6 per step]")
+@click.option("--fps", type=float, help="Frames per second.  [15; program 8; story 1]")
 @figure_options(size=None, sizes="  [1600x1200; 960x720 if animated]")
 def draw(
     scene: str,
@@ -187,24 +186,22 @@ def draw(
     if name not in figure_names():
         raise UnknownNameError("figure", name, figure_names())
     settings = figure_settings(size=size or (MOVING_SIZE if moves else SIZE), **options)
-    moving = None
-    if moves:
-        from warpspace.outputs.animation import AnimationSettings
-
-        moving = AnimationSettings(
-            motion or "exaggeration",
-            FRAMES if frames is None else frames,
-            FPS if fps is None else fps,
-            settings,
-        )
     loaded = load_placed(scene, direction, settings.loop, placed=placed)
     warn_first_order(settings.loop, loaded)
-    if moving is None:
+    if not moves:
         draw_figure_file(name, [loaded], settings, output, force=force)
         echo(f"wrote {output}")
         return
-    from warpspace.outputs.animation import write_animation
+    from warpspace.outputs.animation import AnimationSettings, default_frames, write_animation
 
+    motion, steps = motion or "exaggeration", ()
+    if motion == "story":
+        steps = deferred(f"{SERVICES}:build_story")(loaded, settings.grid)
+    usual_frames, usual_fps = default_frames(motion, len(steps))
+    moving = AnimationSettings(
+        motion, usual_frames if frames is None else frames, usual_fps if fps is None else fps,
+        settings, steps=steps,
+    )  # fmt: skip
     with progress("drawing", moving.frames, "pictures") as bar:
         write_animation(loaded, output, moving, overwrite=force, progress=bar.advance)
     echo(f"{output}: {moving.frames} pictures, {moving.frames / moving.fps:.1f} s")

@@ -110,6 +110,7 @@ class FigureSettings:
     range_fixed: bool = False  # that end was set by the user; stated in the figure
     # restrictions to state in the figure, for instance "excluded: EA0Z"
     conditions: tuple[str, ...] = ()
+    caption: str = ""  # lines of text below the drawing
     # sampling of machines that are compared side by side
     concepts: Concepts = field(default_factory=Concepts)
     # for a report, which has heading, footer and statistics itself: the figure omits them and has
@@ -140,6 +141,10 @@ class FigureSettings:
     def for_scenes(self, scenes: Sequence[Scene]) -> "FigureSettings":
         """Return the settings with the loop in which all scenes are drawn."""
         return replace(self, loop=common_loop(scenes, self.loop))
+
+
+Step = tuple[str, str, Sequence[Scene], FigureSettings]
+"""A step of a story: its text, and name, scenes and settings of its figure."""
 
 
 def check_size(size: tuple[int, int]) -> None:

@@ -124,7 +124,8 @@ def draw_colour_bar(
     )  # fmt: skip
     height = canvas.text_size("0", SIZES.text)[1]
     tick_step = 1
-    while (high - low) / max(1, (len(ticks) - 1) / tick_step) < 1.6 * height:
+    # a small figure may have no room for any
+    while tick_step < len(ticks) and high - low < 1.6 * height * (len(ticks) - 1) / tick_step:
         tick_step += 1
     zero = min(range(len(ticks)), key=lambda i: abs(ticks[i]))
     for index, tick in enumerate(ticks):
@@ -184,6 +185,7 @@ def draw_scale_bars(
 
 
 MOST_TITLE_LINES = 3
+CAPTION = 0.15  # share of the height for a line of the caption, wrapped
 HINTED = 0.92
 """Share of the width for measured text beside other text: hinting widens small letters."""
 
@@ -417,6 +419,13 @@ def start_sheet(
         top = draw_heading(canvas, title, facts)
         bottom = draw_footer(canvas, scenes, legend, errors=errors)
     right, width = canvas.width - margin, canvas.px(SIZES.panel)
+    max_rows = max(1, int(CAPTION * canvas.height / canvas.px(30.0)))
+    for text in reversed(settings.caption.splitlines()):
+        rows = _wrap(canvas, text.split(), right - margin, SIZES.heading, between=" ",
+                     max_rows=max_rows)  # fmt: skip
+        for row in reversed(rows):
+            canvas.text(margin, bottom, row, size=SIZES.heading, max_width=right - margin)
+            bottom += canvas.px(30.0)
     edge = right - width - canvas.px(12.0) if panel else right
     content = (0.6 * margin, bottom, edge, top - canvas.px(6.0))
     column = (right - width, bottom, right, top - canvas.px(18.0))

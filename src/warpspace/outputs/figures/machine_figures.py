@@ -213,7 +213,7 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     ]
     legend = [
         line_entry("nominal trace", lambda theme: theme.muted, SIZES.thin, TRACE_DASHES),
-        LegendEntry(_trace_symbol, "actual trace, exaggerated, coloured by its error"),
+        trace_entry("actual trace, exaggerated, coloured by its error"),
     ]
     if largest == 0.0:
         facts.append("no error of a rotary axis displaces these points: nominal traces only")
@@ -297,6 +297,9 @@ def _points(traces: Sequence[TraceLine]) -> dict[Vector, str]:
     return {point: f"P{number}" for number, point in enumerate(points, 1)}
 
 
-def _trace_symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
-    canvas.line([(x, y), (x + width, y)], width=4.6)
-    canvas.line([(x, y), (x + width, y)], width=3.4, colour="#2f8f8e", zorder=3.1)
+def trace_entry(text: str) -> LegendEntry:
+    def symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
+        canvas.line([(x, y), (x + width, y)], width=4.6)
+        canvas.line([(x, y), (x + width, y)], width=3.4, colour="#2f8f8e", zorder=3.1)
+
+    return LegendEntry(symbol, text)

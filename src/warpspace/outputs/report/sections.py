@@ -31,7 +31,7 @@ from warpspace.analysis.uncertainty.propagation import u95_lines
 from warpspace.exceptions import NoRendererError, OptionError, RenderError, WarpspaceError
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import MAX_CSV_BYTES, MOST_CONCEPTS
-from warpspace.outputs.drawing.settings import PRINTED_PX, FigureSettings
+from warpspace.outputs.drawing.settings import PRINTED_PX, FigureSettings, Step
 from warpspace.outputs.figures.registry import figure_kinds
 from warpspace.outputs.file_output import check_target, write_content
 from warpspace.outputs.processes import FigureWorker
@@ -80,7 +80,6 @@ LINES_WIDTH = 0.72  # of the page, at which curves are printed as large as they 
 Chart = Bars | Lines | Histogram
 Drawn = Callable[[], Block]
 """Waits for a figure; returns a replacement where it cannot be drawn."""
-Step = tuple[str, str, Sequence[Scene], FigureSettings]
 StorySteps = Callable[[Scene, int], Iterable[Step]]
 """Returns the steps of a scene's story for a number of nodes per axis, each as shown on the page:
 caption, name of the figure, its scenes and settings. It needs the app."""
