@@ -115,9 +115,8 @@ class EditorSection(panel.Section):
             if quantity != "mesh"
         }
         guides = {
-            gantry.axis: [spell_typed(round(error, 9)) for error in errors]
-            for gantry in scene.machine.gantries.values()
-            if (errors := machine_edits.guide_errors(picture.state, gantry))
+            axis: machine_edits.guide_errors(picture.state, gantry)
+            for axis, gantry in scene.machine.gantries.items()
         }
         bodies = {frame: _source(source) for frame, source in tables["mesh"].items()}
         return HTML.editor(
