@@ -55,7 +55,7 @@ class Alone:
             call_soon=self._call, store=self.store, picture=LIVE.evaluate(state),
             notify=lambda *words: self.said.append(words), post=self.store.apply, report_results=[],
             send=self.sent.append, dialog_closed=lambda: None,
-            save_file=lambda *file: self.saved.append(file), fit_view=lambda: None,
+            save_file=lambda *file: self.saved.append(file), fit_view=lambda *_: None,
             offers={}, page=SimpleNamespace(
                 report=lambda error: self.said.append(("", str(error))),
                 call=lambda *what: self.called.append(what),

@@ -169,11 +169,11 @@ def test_one_job_after_the_other_says_how_far_it_is_and_hands_over_what_it_raise
         go.wait(10)
         raise WarpspaceError("broken")
 
-    found.start("one", work)
+    found.start("one", work, lambda _: None)
     for number in range(MOST_FILES):
-        found.start(f"n{number}", lambda _, number=number: done.append(number))
+        found.start(f"n{number}", lambda _, number=number: number, done.append)
     with pytest.raises(OptionError, match=f"more: {MOST_FILES} jobs are waiting"):
-        found.start("more", work)
+        found.start("more", work, lambda _: None)
     go.set()
     while not failures or bars[-1]:
         time.sleep(0.01)
@@ -194,7 +194,7 @@ def test_cancelling_frees_the_place_at_once(watched):
         told.set()
         raise RuntimeError("too late")
 
-    found.start("slow", slow)
+    found.start("slow", slow, failures.append)
     found.cancel()
     assert not found.busy
     go.set()

@@ -1,11 +1,12 @@
-"""HTML elements of the page: buttons, text boxes, sliders, choices, sections.
+"""HTML: escaped text, attributes, and elements that are rendered too often for a template.
 
-Every text that is not `Markup` is escaped here. An element sends an action, see `actions.py`.
+Every text that is not `Markup` is escaped here. The other elements are macros of
+`templates/elements.html.j2`. An element sends an action, see `actions.py`.
 """
 
 import re
 from base64 import b64encode
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from functools import lru_cache
 from html import escape
 
@@ -54,34 +55,6 @@ def tag(name: str, body: object = "", **values: object) -> Markup:
     return Markup(f"<{name}{attributes(**values)}>{text(body)}</{name}>")  # noqa: S704
 
 
-def button(
-    label: object,
-    do: AnyAction | None,
-    *,
-    kind: str = "",
-    hint: str = "",
-    pressed: bool | None = None,
-    disabled: bool = False,
-    **extra: object,
-) -> Markup:
-    """Render a button that sends an action; `kind` is "", "main", "quiet" or "link"."""
-    state = None if pressed is None else str(pressed).lower()
-    return tag(
-        "button", label, type="button", class_=f"ws-button {kind}".strip(), data_do=do,
-        title=hint or None, aria_pressed=state, disabled=disabled, **extra,
-    )  # fmt: skip
-
-
-def upload_button(
-    label: str, part: str, most_bytes: int, endings: str, *, hint: str, kind: str = ""
-) -> Markup:
-    """Render a button that opens a file chooser; the files arrive as `Upload` actions."""
-    return tag(
-        "button", label, type="button", class_=f"ws-button {kind}".strip(), data_upload=part,
-        data_most=most_bytes, data_accept=endings, title=hint,
-    )  # fmt: skip
-
-
 number, signed = spell_fixed, spell_change
 
 
@@ -112,59 +85,17 @@ def ident(name: AnyAction | str) -> str:
     return "ws-" + re.sub(r"[^0-9A-Za-z]+", "-", name)
 
 
-def field(
-    label: object, control: Markup, name: AnyAction | str, unit: str = "", hint: str = ""
-) -> Markup:
-    return fill(
-        '<div class="ws-field"{title}><label for="{id}">{label}</label>{control}{unit}</div>',
-        title=attributes(title=hint or None), id=ident(name), label=label, control=control,
-        unit=tag("span", unit, class_="ws-unit") if unit else EMPTY,
-    )  # fmt: skip
-
-
-def _input(**values: object) -> Markup:
-    return Markup(f"<input{attributes(**values)}>")  # noqa: S704 - escaped there
-
-
-def text_box(name: AnyAction, value: str, *, placeholder: str = "", live: bool = False,
-             label: str = "", size: str = "", **extra: object) -> Markup:  # fmt: skip
-    """Render a text box that sends its text on Enter or on blur; with `live` on each key."""
-    return _input(
-        type="text", id=extra.pop("id", ident(name)), class_=f"ws-box {size}".strip(), value=value,
-        data_set=name, data_live=name if live else None, placeholder=placeholder or None,
-        aria_label=label or None, autocomplete="off", spellcheck="false", **extra,
-    )  # fmt: skip
-
-
 def slider(name: AnyAction, value: float | str, low: float, high: float, step: float, *,
            label: str = "", twin: AnyAction | str = "", text: str = "") -> Markup:  # fmt: skip
     """Render a slider; `twin` is the number box that receives digits typed on the slider."""
-    return _input(
+    values = attributes(
         type="range", id=None if not label else ident(name) + "-slider", class_="ws-slider",
         min=f"{low:g}", max=f"{high:g}", step=f"{step:g}",
         value=value if isinstance(value, str) else f"{value:.10g}", data_set=name,
         data_twin=ident(twin) if twin else None, aria_label=label or None,
         aria_valuetext=text or None,
     )  # fmt: skip
-
-
-def choice(name: AnyAction, value: str, labels: Mapping[str, str], *, label: str = "") -> Markup:
-    options = join(
-        tag("option", said, value=key, selected=key == value) for key, said in labels.items()
-    )
-    return tag(
-        "select", options, id=ident(name), class_="ws-box", data_set=name, aria_label=label or None
-    )
-
-
-def switch(name: AnyAction, label: object, *, on: bool, hint: str = "") -> Markup:
-    box = _input(type="checkbox", id=ident(name), checked=on, data_set=name)
-    return tag("label", join((box, " ", label)), class_="ws-switch", title=hint or None)
-
-
-def rows(pairs: Iterable[tuple[object, object]], kind: str = "ws-rows") -> Markup:
-    body = join(fill("<tr><th>{head}</th><td>{value}</td></tr>", head=h, value=v) for h, v in pairs)
-    return tag("table", body, class_=kind)
+    return Markup(f"<input{values}>")  # noqa: S704 - escaped there
 
 
 @lru_cache(maxsize=64)

@@ -1,7 +1,7 @@
 """HTML of the panels: macros of Jinja templates, one file a panel.
 
 `Templates("design").limit(value=...)` renders the macro `limit` of `templates/design.html.j2`.
-A macro knows the elements of `html.py` (`button`, `field`, `section` ...) and the actions as `do`.
+A macro knows the elements of `elements.html.j2` and `html.py`, and the actions as `do`.
 Every text that is not `Markup` is escaped, also what a macro receives; an unknown name is an error.
 Line breaks between elements are for readers of the template only.
 """
@@ -37,6 +37,7 @@ def _environment() -> Environment:
     )
     names: Any = environment.globals
     names.update(vars(html), do=actions)
+    names.update(vars(environment.get_template("elements.html.j2").module))
     return environment
 
 

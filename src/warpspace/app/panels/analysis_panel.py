@@ -9,10 +9,9 @@ import io
 import json
 import re
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple
 
 from markupsafe import Markup
 
@@ -53,7 +52,6 @@ MOST_STEPS = 4  # errors listed on a card
 SAME = 1e-3  # µm or µrad; smaller changes of an error are not listed
 EXAMPLES = {"X=..,Y=..": "X=0,B=30", "X,Y,Z": "100,0,50"}  # by metavariable
 HTML = Templates("analysis_panel")
-T = TypeVar("T")
 ResultKey = tuple[object, ...]
 
 
@@ -280,7 +278,7 @@ class AnalysisPanel(Section):
             cards = tuple((change, _change_html(state, change)) for change in result.changes())
             return AnalysisOutcome(key, result, cards, took_s)
 
-        self._run_job(self.kind.doing, compute, self._accept_outcome)
+        self._jobs.start(self.kind.doing, compute, self._accept_outcome)
 
     def run_if_stale(self, state: AppState) -> None:
         """Run it if its inputs have changed; during a drag, when that pauses."""
@@ -290,17 +288,6 @@ class AnalysisPanel(Section):
             self.context.restart_idle(self)
         else:
             self._run(state)
-
-    def _run_job(
-        self, name: str, compute: Callable[[Job], T], accept: Callable[[T], None],
-        jobs: Jobs | None = None,
-    ) -> None:  # fmt: skip
-        def work(job: Job) -> None:
-            product = compute(job)
-            if not job.is_set():
-                self.context.call_soon(partial(accept, product))
-
-        (jobs or self._jobs).start(name, work)
 
     def _accept_outcome(self, outcome: AnalysisOutcome) -> None:
         self.outcome, self.problem = outcome, None

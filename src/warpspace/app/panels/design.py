@@ -252,21 +252,18 @@ class ConceptsPanel(AnalysisPanel):
         draws = self.context.services.draw_concepts is not None
         return (HTML.sheet(stale) if draws else EMPTY) + super().actions(result, stale=stale)
 
-    @on(do.Input.ADD_CONCEPT)
-    def add(self, state: AppState, title: str) -> AppState | None:
-        chosen, key = self.chosen(state), title
-        is_new = key in self.offers(state) and key not in chosen
-        return self._with(state, [*chosen, key][:MOST_CONCEPTS]) if is_new else None
-
-    @on(do.Input.REMOVE_CONCEPT)
-    def remove(self, state: AppState, title: str) -> AppState | None:
-        chosen = self.chosen(state)
-        remaining = [key for key in chosen if key != title]
-        return None if remaining == chosen else self._with(state, remaining)
-
-    def _with(self, state: AppState, chosen: list[str]) -> AppState:
+    @on(do.Input.ADD_CONCEPT, do.Input.REMOVE_CONCEPT)
+    def choose(self, state: AppState, action: do.InputValue) -> AppState | None:
+        chosen, key = self.chosen(state), action.value
+        if action.input is do.Input.REMOVE_CONCEPT and key in chosen:
+            chosen.remove(key)
+        elif action.input is do.Input.ADD_CONCEPT and key in self.offers(state).keys() - chosen:
+            chosen.append(key)
+        else:
+            return None
         self.outcome = None  # other machines are compared
-        return replace(state, forms={**state.forms, f"{self.name}.machines": "\n".join(chosen)})
+        forms = {**state.forms, f"{self.name}.machines": "\n".join(chosen[:MOST_CONCEPTS])}
+        return replace(state, forms=forms)
 
     @on(do.Input.OPEN_CONCEPT)
     def open(self, state: AppState, title: str) -> None:
@@ -282,7 +279,7 @@ class ConceptsPanel(AnalysisPanel):
             return
         result: Any = outcome.result
         scenes, dark = tuple(self.scenes(state)), state.shown.dark
-        self._run_job(
+        self._jobs.start(
             "Drawing the machines",
             lambda job: draw(scenes, result.analysis, dark, job),
             partial(self.context.save_file, "concepts.png"),

@@ -93,11 +93,8 @@ class WorstPanel(Section):
             state = point_explanation.with_picked(state, pick_worst(picture))
         return replace(state, lever="" if key == state.lever else key)
 
-    @on(do.Signal.SHOW_LEVER)
-    def show_lever(self, state: AppState) -> None:
-        self.context.call_soon(self._show_lever)
-
-    def _show_lever(self) -> None:
+    @on(do.Signal.SHOW_LEVER, later=True)
+    def show_lever(self) -> None:
         picture, camera = self.context.picture, self.context.camera.remember()
         if picture is None or picture.state.picked is None or picture.is_difference:
             return
@@ -171,18 +168,14 @@ class DistancePanel(AnalysisPanel):
         note = "\n".join(drawn[0].lines()) if drawn else ""
         return HTML.distance(POINTS.get(point), any(map(state.forms.get, POINTS)), note)
 
-    @on(do.Signal.PICK_POINTS)
-    def pick(self, state: AppState) -> AppState:
-        return replace(state, forms={**state.forms, **dict.fromkeys(POINTS, "")})
-
-    @on(do.Signal.STOP_PICKING)
-    def stop(self, state: AppState) -> AppState:
-        forms = {name: text for name, text in state.forms.items() if text or name not in POINTS}
-        return replace(state, forms=forms)
-
-    @on(do.Signal.CLEAR_POINTS)
-    def clear(self, state: AppState) -> AppState:
-        return replace(state, forms={k: v for k, v in state.forms.items() if k not in POINTS})
+    @on(do.Signal.PICK_POINTS, do.Signal.STOP_PICKING, do.Signal.CLEAR_POINTS)
+    def set_points(self, state: AppState, signal: do.Signal) -> AppState:
+        """Await both points; or await none, and keep or remove the present ones."""
+        stops, points = signal is do.Signal.STOP_PICKING, dict[str, str]()
+        if signal is do.Signal.PICK_POINTS:
+            points = dict.fromkeys(POINTS, "")
+        forms = {k: v for k, v in state.forms.items() if k not in POINTS or (stops and v)}
+        return replace(state, forms=forms | points)
 
 
 class VolumePanel(Section):

@@ -55,15 +55,13 @@ class JobDialog(Dialog):
         if current is None:
             return
 
-        def work(job: Job) -> None:
+        def compute(job: Job) -> tuple[str, bytes]:
             picture = current
             if not as_drawn and drawn_tables(current.state):  # files do not contain tables
                 picture = PLAIN.evaluate(without_table(current.state))
-            content = write(picture, job)
-            if not job.is_set():
-                self.context.save_file(f"{transfers.file_stem(picture)}{ending}", content)
+            return f"{transfers.file_stem(picture)}{ending}", write(picture, job)
 
-        self._jobs.start(name, work)
+        self._jobs.start(name, compute, lambda file: self.context.save_file(*file))
 
     @on(do.Cancel, later=True)
     def cancel(self, _: do.Cancel) -> None:
@@ -102,9 +100,9 @@ class FilesDialog(JobDialog):
             if upload.name.lower().endswith(endings):
                 self.context.send(msgspec.structs.replace(upload, panel=panel))
                 return
-        self._uploads.start("Opening", partial(self._parse, upload))
+        self._uploads.start("Opening", lambda _: self._parse(upload), lambda show: show())
 
-    def _parse(self, upload: do.Upload, job: Job) -> None:
+    def _parse(self, upload: do.Upload) -> Callable[[], None]:
         name, content = transfers.read_upload(upload)
         notes, is_robot = list[str](), b"<robot" in content[:4096]
         if is_robot:
@@ -112,14 +110,15 @@ class FilesDialog(JobDialog):
         elif name.lower().endswith(".toml"):
             text = transfers.upload_text(content, name)
         else:
-            self.context.call_soon(partial(self.context.offer_import, name, content))
-            return
+            return partial(self.context.offer_import, name, content)
         opened, camera = scene_file.open_text(text, transfers.safe_name(name), name)
         replaces_all = is_robot or scene_file.settings_of(text) != ""
-        if not job.is_set():
-            show = partial(self.context.show_opened, keeps_comparison=not replaces_all)
-            self.context.call_soon(partial(show, opened, camera))
+
+        def show() -> None:
+            self.context.show_opened(opened, camera, keeps_comparison=not replaces_all)
             self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
+
+        return show
 
     @on(do.Input.FOLLOW_LINK, later=True)
     def follow(self, link: str) -> None:

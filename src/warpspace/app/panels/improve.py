@@ -181,7 +181,7 @@ class CompensatePanel(AnalysisPanel):
             return
         dark, saves = state.shown.dark, action.save
         save = partial(self.context.save_file, f"{STEM}.png")
-        self._run_job(
+        self._jobs.start(
             "Drawing the maps", lambda job: draw(result, dark, not saves, job),
             save if saves else partial(self._show_maps, result),
         )  # fmt: skip

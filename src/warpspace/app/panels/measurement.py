@@ -82,7 +82,7 @@ class FilesPanel(AnalysisPanel):
 
     def receive(self, read: Callable[[], tuple[str, bytes]]) -> None:
         """Parse files in jobs, one after the other; errors are shown above the files."""
-        self._run_job("Reading", lambda _: self.parse(*read()), self._accept, self._uploads)
+        self._uploads.start("Reading", lambda _: self.parse(*read()), self._accept)
 
     def _accept(self, accept: Callable[[], None]) -> None:
         self._upload_problem = ""
@@ -258,15 +258,13 @@ class CalibratePanel(FilesPanel):
         arrows = HTML.arrows(self._arrows, ARROWS, self._draw_arrows())
         return join((arrows, *map(block_html, visible), folded))
 
-    @on(do.Input.SET_READING_KIND, later=True)
-    def set_kind(self, kind: str) -> None:
-        self._next_kind = kind if kind in (*KINDS, *bench_names()) else ""
-        self.rerender()
-
-    @on(do.Input.SET_TEST_OPTIONS, later=True)
-    def set_test_options(self, options: str) -> None:
-        name = self._next_kind.partition(":")[0]
-        self._next_kind = f"{name}:{options.strip()[:LONGEST_KIND]}".strip(":")
+    @on(do.Input.SET_READING_KIND, do.Input.SET_TEST_OPTIONS, later=True)
+    def set_kind(self, action: do.InputValue) -> None:
+        name, options = action.value, ""
+        if action.input is do.Input.SET_TEST_OPTIONS:
+            name, options = self._next_kind.partition(":")[0], name.strip()[:LONGEST_KIND]
+        is_known = name in (*KINDS, *bench_names())
+        self._next_kind = f"{name}:{options}".strip(":") if is_known else ""
         self.rerender()
 
     @on(do.Input.ADD_READINGS, later=True)

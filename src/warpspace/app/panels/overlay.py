@@ -272,12 +272,10 @@ class ControlsPanel(Panel):
     def set_travel(self, state: AppState, direction: str) -> AppState:
         return with_travel(state, direction)
 
-    @on(do.ViewFrom, do.SetOrthographic, later=True)
-    def move_camera(self, action: do.ViewFrom | do.SetOrthographic) -> None:
-        if isinstance(action, do.ViewFrom):
-            self.context.fit_view(action.view)
-        else:
-            self.context.fit_view(lens=action.value == "1")
+    @on(do.Signal.FIT_VIEW, do.ViewFrom, do.SetOrthographic, later=True)
+    def move_camera(self, action: do.AnyAction) -> None:
+        lens = action.value == "1" if isinstance(action, do.SetOrthographic) else None
+        self.context.fit_view(action.view if isinstance(action, do.ViewFrom) else None, lens)
         self.rerender()
 
 
@@ -353,20 +351,17 @@ class ComparePanel(Panel):
     def open(self) -> None:
         self.context.page.call("menu", self.name)
 
-    @on(do.Signal.PIN_AS_A)
-    def pin(self, state: AppState) -> AppState:
-        return with_pin(state)
-
-    @on(do.Signal.END_COMPARISON)
-    def end(self, state: AppState) -> AppState:
-        return with_sides(state, state.comparison.a, None)
+    @on(do.Signal.PIN_AS_A, do.Signal.END_COMPARISON)
+    def start_or_end(self, state: AppState, signal: do.Signal) -> AppState:
+        is_start = signal is do.Signal.PIN_AS_A
+        return with_pin(state) if is_start else with_sides(state, state.comparison.a, None)
 
     @on(do.SetSide)
     def set_side(self, state: AppState, action: do.SetSide) -> AppState | None:
         """Set a side of the comparison; an unknown title is ignored."""
         chosen, scene = state.comparison, self.context.scenes.get(action.value)
         if action == do.SetSide("b", NOBODY):
-            return self.end(state)
+            return with_sides(state, chosen.a, None)
         side = _own_sides(state).get(action.value)
         if side is None and scene is not None:
             side = replace(scene_side(scene), title=action.value)

@@ -178,20 +178,17 @@ class HelpDialog(Dialog):
         query = picture.state.page.command
         return HTML.help(query, self._find_commands(query), IN_PAGE, picture.state.scene)
 
-    @on(do.Input.RUN_COMMAND)
-    def run(self, state: AppState, label: str) -> AppState | None:
-        commands = self._find_commands(state.page.command)
-        return self._run(state, [c for c in commands if c.label == label])
-
-    @on(do.Input.RUN_FIRST_COMMAND)
-    def run_first(self, state: AppState, query: str) -> AppState | None:
-        return self._run(state, self._find_commands(query) if query else [])
-
-    def _run(self, state: AppState, commands: Iterable[Command]) -> AppState | None:
-        actions = [command.action for command in commands if command.action not in IN_PAGE]
-        if not actions:
+    @on(do.Input.RUN_COMMAND, do.Input.RUN_FIRST_COMMAND)
+    def run(self, state: AppState, action: do.InputValue) -> AppState | None:
+        """Run a command of the list, or the first one that a query finds."""
+        is_first = action.input is do.Input.RUN_FIRST_COMMAND
+        query = action.value if is_first else state.page.command
+        commands = [c for c in self._find_commands(query) if c.action not in IN_PAGE]
+        if not is_first:
+            commands = [c for c in commands if c.label == action.value]
+        if not commands or (is_first and not query):
             return None
-        self.context.send(actions[0])
+        self.context.send(commands[0].action)
         return self.closed(state)
 
 
@@ -223,10 +220,6 @@ class PagePanel(Panel):
             return
         done = f"{'Undone' if is_undo else 'Redone'}: {description}"
         self.context.notify(done if description else f"Nothing to {signal}")
-
-    @on(do.Signal.FIT_VIEW, later=True)
-    def fit_view(self) -> None:
-        self.context.fit_view()
 
     @on(do.Signal.CLOSE_DIALOG, do.Signal.SHOW_HINTS)
     def close_dialog(self, state: AppState, signal: do.Signal) -> AppState:

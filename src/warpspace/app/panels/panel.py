@@ -24,7 +24,7 @@ from viser import ClientHandle, ViserServer
 from warpspace.analysis.description import Result
 from warpspace.app.browser import actions as do
 from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, join, tag
+from warpspace.app.browser.html import EMPTY, tag
 from warpspace.app.browser.incoming import Events
 from warpspace.app.browser.page import Page
 from warpspace.app.browser.templates import Templates
@@ -209,13 +209,14 @@ class Refresh(Enum):
 
 ActionKind: TypeAlias = type[do.Action] | do.Signal | do.Input
 F = TypeVar("F", bound=Callable[..., AppState | None])
+T = TypeVar("T")
 
 
 def on(*kinds: ActionKind, later: bool = False) -> Callable[[F], F]:
     """Mark the handler of actions: ``method(state, action)`` returns the changed state, or None.
 
     A later one, ``method(action)``, leaves the state alone and is called after it is updated. That
-    of a single `Signal` is called without the action, that of an `Input` with its text.
+    of a single `Signal` is called without the action, that of a single `Input` with its text.
     """
 
     def mark(method: F) -> F:
@@ -262,8 +263,9 @@ class Panel:
             return state
         name, kinds, is_later = self.handlers[do.kind_of(action)]
         method: Any = getattr(self, name)
-        value = action.value if isinstance(action, do.InputValue) else action
-        values = () if kinds == (action,) else (value,)  # of a signal
+        values: tuple[object, ...] = (action,)
+        if len(kinds) == 1 and isinstance(action, do.Signal | do.InputValue):
+            values = (action.value,) if isinstance(action, do.InputValue) else ()
         if not is_later:
             return method(state, *values) or state
         self.context.call_soon(partial(method, *values))
@@ -330,10 +332,6 @@ class Dialog(Panel):
         return {"window": HTML.dialog(self.name, self.title, self.body(picture))}
 
 
-def actions(*buttons: Markup) -> Markup:
-    return tag("div", join(buttons), class_="ws-actions")
-
-
 def tiny(text: object) -> Markup:
     return tag("p", text, class_="ws-tiny")
 
@@ -344,11 +342,6 @@ def quiet(text: object) -> Markup:
 
 def alert(text: object) -> Markup:
     return tag("p", text, class_="ws-problem", role="alert")
-
-
-def details(heading: object, *parts: object, kind: str = "options", **extra: object) -> Markup:
-    """Render parts that are folded away under a heading."""
-    return tag("details", join((tag("summary", heading), *parts)), class_=f"ws-{kind}", **extra)
 
 
 def setting(state: AppState, path: str, *, text: str = "", bar: bool = False) -> Markup:
@@ -395,23 +388,23 @@ class Jobs:
         self._panel, self._on_failure = panel, on_failure
         self._on_progress = partial(panel.context.call_soon, on_progress)
         self._job: Job | None = None
-        self._waiting: deque[tuple[str, Callable[[Job], None]]] = deque()
+        self._waiting: deque[tuple[str, Callable[[Job], Any], Callable[[Any], None]]] = deque()
 
     @property
     def busy(self) -> bool:
         return self._job is not None
 
-    def start(self, name: str, work: Callable[[Job], None]) -> None:
-        """Start a job, now or after those before it. For the session."""
+    def start(self, name: str, compute: Callable[[Job], T], accept: Callable[[T], None]) -> None:
+        """Start a job, now or after those before it; the session accepts what it computes."""
         if self._job is not None:
             if len(self._waiting) == MOST_FILES:
                 raise OptionError(f"{name}: {MOST_FILES} jobs are waiting; try again later")
-            self._waiting.append((name, work))
+            self._waiting.append((name, compute, accept))
             self._on_progress()
             return
         self._job = job = Job(name, self._on_progress)
         self._panel.context.jobs.add(job)
-        run = partial(self._run, job, work)
+        run = partial(self._run, job, compute, accept)
         threading.Thread(target=run, name="warpspace-work", daemon=True).start()
         self._on_progress()
 
@@ -425,12 +418,16 @@ class Jobs:
         if job is None:
             return EMPTY
         share = html.number(100.0 * job.share, 0) if job.share else ""
-        return HTML.progress(job.name, share, [name for name, _ in self._waiting], self._panel.name)
+        return HTML.progress(
+            job.name, share, [name for name, *_ in self._waiting], self._panel.name
+        )
 
-    def _run(self, job: Job, work: Callable[[Job], None]) -> None:
+    def _run(self, job: Job, compute: Callable[[Job], T], accept: Callable[[T], None]) -> None:
         error = None
         try:
-            work(job)
+            product = compute(job)
+            if not job.is_set():
+                self._panel.context.call_soon(partial(accept, product))
         except Exception as raised:  # noqa: BLE001 - reported by the session
             error = raised
         self._panel.context.call_soon(partial(self._end, job, error))

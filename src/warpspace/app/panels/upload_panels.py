@@ -14,8 +14,7 @@ from warpspace.analysis.blocks import Block, Curve, Lines, Style, Table
 from warpspace.analysis.options import Grammar, Option, option, typed_word
 from warpspace.analysis.registry import Entry
 from warpspace.app.browser import actions as do
-from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button
+from warpspace.app.browser.html import EMPTY
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.templates import Templates
 from warpspace.app.documents.transfers import IN_BOX, upload_text
@@ -318,7 +317,7 @@ class PartPanel(SceneOverlayPanel):
     def result_html(self, result: description.Result) -> Markup:
         *_, features = (block for block in result.blocks() if isinstance(block, Table))
         verdicts = [(name, verdict) for name, *_, verdict, _ in features.rows if verdict]
-        return html.rows(verdicts) + super().result_html(result)
+        return HTML.verdicts(verdicts) + super().result_html(result)
 
     @on(do.TurnPart)
     def turn(self, state: AppState, action: do.TurnPart) -> AppState | None:
@@ -361,17 +360,11 @@ class ProgramPanel(SceneOverlayPanel):
         return HTML.line(line, text[at - 1][:MOST_LETTERS]) if at else EMPTY
 
     def result_html(self, result: description.Result) -> Markup:
-        def link(line: int) -> Markup:
-            hint = "Show this line in the drawing; a click on the path selects its line"
-            return button(
-                line, do.SetOption(self.name, "at_line", str(line)), kind="link", hint=hint
-            )
-
         *tables, worst = (block for block in result.blocks() if isinstance(block, Table))
         line, *columns = worst.columns
         shown = ("|E|", "largest contributions")
         columns = (replace(column, shows=column.heading in shown) for column in columns)
-        narrow = replace(worst, columns=(replace(line, form=link), *columns))
+        narrow = replace(worst, columns=(replace(line, form=HTML.line_link), *columns))
         return block_html(narrow) + details_html((*tables, worst))
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
