@@ -1,6 +1,6 @@
 """Diagonal displacement tests: body, face and step diagonals (ISO 230-6)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -10,7 +10,8 @@ from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ALONG, DataColumn, ReadingsFile
-from warpspace.bench.kinds.positioning import target_statistics
+from warpspace.bench.kinds.positioning import mean_by, target_statistics
+from warpspace.bench.linear_form import LinearForm, absolute, largest_range, zone
 from warpspace.bench.placing import PLANES, find_plane, following_axes, tool_offset, tool_points
 from warpspace.bench.plan import BenchPlan, IndexArray, Outcome, build_outcome, build_plan
 from warpspace.exceptions import OptionError
@@ -46,8 +47,8 @@ def means_along(position: Array, travel_sign: Array, readings: Array) -> dict[st
 
 def squareness_of_diagonals(
     plan: BenchPlan, names: Sequence[str], lengths: Array
-) -> dict[str, float]:
-    """Fit the squareness errors that explain the lengths of diagonals, µrad.
+) -> dict[str, Array]:
+    """Fit the squareness errors, µrad, that explain the lengths of diagonals, [d, ...], µm.
 
     A squareness of γ between axes of lengths a and b changes a diagonal of length L by ±γ·a·b/L;
     the common part of all diagonals is scale.
@@ -65,7 +66,7 @@ def squareness_of_diagonals(
         faces = np.kron(np.eye(3), np.ones((2, 1)))
         design = np.concatenate([faces, np.stack(columns, -1)], axis=-1)
     solution = np.linalg.lstsq(design, lengths, rcond=None)[0]
-    return dict(zip(keys, solution[-3:].tolist(), strict=True))
+    return dict(zip(keys, solution[-3:], strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -265,8 +266,33 @@ class Diagonals(BenchTest):
         if reversals:
             quantities.append(("B_um", "largest reversal B", max(reversals)))
         for key, value in squareness_of_diagonals(plan, names, lengths).items():
-            quantities.append((f"squareness_{key}_urad", f"equivalent squareness {key}", value))
+            text = f"equivalent squareness {key}"
+            quantities.append((f"squareness_{key}_urad", text, float(value)))
         return build_outcome(quantities, {"diagonals": rows})
+
+    def linear_forms(self, plan: BenchPlan, readings: Array) -> Mapping[str, LinearForm]:
+        number, travel_sign = plan.marks["diagonal"], plan.marks["travel_sign"]
+        position = np.round(plan.marks["position_mm"], 3)
+        reversals: list[Array] = []
+        lengths: list[Array] = []
+        for index in range(len(self.names)):
+            chosen = number == index
+            mean = mean_by(position[chosen], readings[chosen])
+            lengths.append(mean[-1] - mean[0])
+            forward, backward = (chosen & (travel_sign == sign) for sign in (1.0, -1.0))
+            if backward.any():
+                difference = mean_by(position[forward], readings[forward])
+                difference -= mean_by(position[backward], readings[backward])
+                reversals.append(difference)
+        forms = {
+            "E_um": largest_range(readings, number),
+            "length_difference_um": zone(np.stack(lengths)),
+        }
+        if reversals:
+            forms["B_um"] = absolute(*reversals)
+        for key, value in squareness_of_diagonals(plan, self.names, np.stack(lengths)).items():
+            forms[f"squareness_{key}_urad"] = absolute(value[None])
+        return forms
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
