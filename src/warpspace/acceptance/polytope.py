@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from heapq import heapify, heappop, heappush
 from itertools import combinations, count
 from typing import NamedTuple
@@ -29,8 +29,10 @@ class InfeasibleError(OptionError):
 class Constraint:
     """A test and its limit: the size of its form is at most the limit."""
 
+    name: str
     form: LinearForm  # of the values of errors: rows [n, V]
     limit: float  # µm or µrad
+    quantity: str = ""
 
 
 class Vertex(NamedTuple):
@@ -74,7 +76,7 @@ class Polytope:
         self._test = np.repeat(np.arange(len(blocks)), [len(block) for block in blocks])
         self._added = np.zeros(0, dtype=np.intp)
         self._solver = highspy.Highs()
-        self._solver.setOptionValue("output_flag", False)
+        self._solver.silent()
         self._solver.setOptionValue("threads", 1)
         free = np.full(unknowns, np.inf)
         empty = np.zeros(0)
@@ -84,8 +86,13 @@ class Polytope:
         )  # fmt: skip
         self._solver.changeObjectiveSense(highspy.ObjSense.kMaximize)
         starts = [len(block) // ADDED or 1 for block in blocks]
-        self._add(np.concatenate([np.flatnonzero(self._test == number)[::step]
-                                  for number, step in enumerate(starts)]) if blocks else self._added)
+        self._add(
+            np.concatenate(
+                [np.flatnonzero(self._test == number)[::step] for number, step in enumerate(starts)]
+            )
+            if blocks
+            else self._added
+        )
 
     @property
     def is_symmetric(self) -> bool:
@@ -128,12 +135,18 @@ class Polytope:
         return np.concatenate(rows)
 
     def _add(self, rows: NDArray[np.intp]) -> None:
-        width, sizes = self._rows.shape[1], self._sizes[rows]
+        sizes = self._sizes[rows]
         block = self._rows[rows]
         index, column = np.nonzero(block)
         starts = np.searchsorted(index, np.arange(len(rows))).astype(np.int32)
         self._solver.addRows(
-            len(rows), -sizes, sizes, len(index), starts, column.astype(np.int32), block[index, column]
+            len(rows),
+            -sizes,
+            sizes,
+            len(index),
+            starts,
+            column.astype(np.int32),
+            block[index, column],
         )
         self._added = np.append(self._added, rows)
 
@@ -182,21 +195,20 @@ class LargestError:
 
 
 class _Search:
-    def __init__(self, polytope: Polytope, gains: Array, gap: float) -> None:
+    def __init__(self, polytope: Polytope, gains: Array, gap: float, limit_um: float) -> None:
         self.polytope, self.gains, self.gap = polytope, gains, gap
+        self.limit_um = 0.0 if np.isinf(limit_um) else limit_um
         self.best = LargestError(0.0, 0.0, 0, np.zeros(gains.shape[2]), np.zeros(3))
-        self.solved = 0
 
     @property
     def threshold_um(self) -> float:
-        return (1.0 + self.gap) * self.best.low_um
+        return max((1.0 + self.gap) * self.best.low_um, self.limit_um)
 
     def height(self, node: int, direction: Array) -> float:
         """Maximise one direction at a node; improve the best machine, its direction iterated."""
         first, cost = np.nan, direction @ self.gains[node]
         while True:
             vertex = self.polytope.maximise(cost)
-            self.solved += 1
             first = vertex.maximum if np.isnan(first) else first
             errors = self.gains @ vertex.values
             norm = np.linalg.norm(errors, axis=1)
@@ -206,7 +218,7 @@ class _Search:
             self.best = LargestError(float(norm[at]), 0.0, at, vertex.values, errors[at])
             cost = errors[at] @ self.gains[at] / norm[at]
 
-    def close(self, node: int, watch: Callable[[float], None]) -> float:
+    def close(self, node: int, check_cancelled: Callable[[], None]) -> float:
         """Return an upper bound of |E| at a node, at most the threshold."""
         triangles = icosahedron()
         if self.polytope.is_symmetric:
@@ -218,7 +230,7 @@ class _Search:
             key = np.round(sign * corner, 9).tobytes()
             if key not in heights and solve:
                 heights[key] = self.height(node, corner)
-                watch(0.0)
+                check_cancelled()
             bounds = self.polytope.bound((corner @ self.gains[node])[None])
             return heights.get(key, float(bounds[0]))
 
@@ -230,7 +242,7 @@ class _Search:
         queue = [entry(triangle) for triangle in triangles]
         heapify(queue)
         while -queue[0][0] > self.threshold_um:
-            bound, _, triangle = heappop(queue)
+            triangle = heappop(queue)[2]
             exact = np.array([height(corner, solve=True) for corner in triangle])
             if cone_bound(triangle, exact) <= self.threshold_um:
                 heappush(queue, entry(triangle))
@@ -244,7 +256,11 @@ class _Search:
 
 
 def find_largest_error(
-    polytope: Polytope, gains: Array, watch: Callable[[float], None], gap: float = GAP
+    polytope: Polytope,
+    gains: Array,
+    watch: Callable[[float], None],
+    gap: float = GAP,
+    limit_um: float = np.inf,
 ) -> LargestError:
     """Find the largest |E| over nodes and machines, with bounds that differ by at most `gap`.
 
@@ -252,22 +268,33 @@ def find_largest_error(
     ----------
     gains : ndarray, [N, 3, V], µm per µm or µrad
         Response of each node to each value.
+    watch : callable
+        Called with the completed share of the work.
+    gap : float, optional
+    limit_um : float, optional
+        Limit to be decided upon: the bounds are as close as it takes to be on one side of it.
+
+    Notes
+    -----
+    |E| at a node is the largest of u · E over unit vectors u. Where u lies in a triangle of
+    directions, u · E is bounded by the largest d · E of its corners d over the machines
+    (`cone_bound`), which are linear programs. From an icosahedron, triangles with a bound above the
+    best machine are divided in four. Each solution that improves the best machine is iterated: the
+    direction becomes that of its error vector. Nodes, and corners of triangles, whose bound by
+    tolerances alone is small enough are not solved.
     """
-    search, high = _Search(polytope, gains, gap), 0.0
+    search, high = _Search(polytope, gains, gap, limit_um), 0.0
     triangles = icosahedron()
     corners = triangles.reshape(-1, 3)
     heights = np.stack([polytope.bound(corners @ each) for each in gains]).reshape(-1, 20, 3)
-    bounds = np.array([
-        max(cone_bound(t, h) for t, h in zip(triangles, each, strict=True)) for each in heights
-    ])
-    used = 0
-    for node in np.argsort(-bounds):
+    bounds = np.array(
+        [max(cone_bound(t, h) for t, h in zip(triangles, each, strict=True)) for each in heights]
+    )
+    for done, node in enumerate(np.argsort(-bounds)):
         if bounds[node] <= max(search.threshold_um, high):
             high = max(high, bounds[node])
             break
-        used += 1
-        high = max(high, search.close(int(node), watch))
-    import os
-    if os.environ.get("DEBUG"):
-        print("LPs", search.solved, "nodes", used, "rows", len(polytope._added), polytope._rows.shape)
+        high = max(high, search.close(int(node), partial(watch, done / len(bounds))))
+        if search.best.low_um > limit_um:
+            break
     return replace(search.best, high_um=max(high, search.best.low_um))

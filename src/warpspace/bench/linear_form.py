@@ -41,6 +41,4 @@ def largest_range(rows: Array, group: Array) -> LinearForm:
 def project_out(rows: Array, *columns: Array) -> Array:
     """Return the least-squares residuals of rows, [n, ...], about a sum of columns, [n] each."""
     design = np.stack(columns, axis=-1)
-    flat = rows.reshape(len(rows), -1)
-    fit = np.linalg.lstsq(design, flat, rcond=None)[0]
-    return (flat - design @ fit).reshape(rows.shape)
+    return rows - np.tensordot(design, np.tensordot(np.linalg.pinv(design), rows, 1), 1)

@@ -117,7 +117,7 @@ def fit_centre(plan: BenchPlan, readings: Array, rows: NDArray[np.bool_]) -> tup
     marks, values = plan.marks, readings[rows]
     elliptic = covered_deg(marks["angle_deg"][rows]) >= HALF_DEG - 1e-6
     part = _circle_design(plan)[rows, : 5 if elliptic else 3]
-    fit = np.asarray(np.linalg.lstsq(part, values, rcond=None)[0], dtype=np.float64)
+    fit = np.linalg.pinv(part) @ values
     return fit, values if "as_read" in marks else values - part[:, 1:3] @ fit[1:3]
 
 
