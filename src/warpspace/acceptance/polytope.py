@@ -18,6 +18,7 @@ from warpspace.units import Array
 FEASIBLE = 1e-7  # share of a limit by which rows may exceed it
 ADDED = 8  # rows of one test that are added to the program at a time
 GAP = 0.02  # of upper and lower bound
+SIDE = np.array([1.0, 1e-3, 1e-6])  # of two opposite directions, the one on it is solved
 MAX_ROWS = 60_000  # functionals of all tests
 
 
@@ -118,13 +119,17 @@ class Polytope:
         offset = float(np.abs(dual) @ self._sizes[self._added])
         return Vertex(values[:count], float(cost @ values[:count]), gradient, offset)
 
-    def bound(self, costs: Array, vertex: Vertex | None = None) -> Array:
-        """Compute upper bounds of cost vectors, [n, V], from the proof of another one."""
+    def bound(self, cost: Array, proofs: Sequence[Vertex]) -> float:
+        """Return an upper bound of a functional, [V], from the proofs of others."""
+        rest = cost - np.array([proof.gradient for proof in proofs])
         middle, half = (self.upper + self.lower) / 2.0, (self.upper - self.lower) / 2.0
-        if vertex is None:
-            return costs @ middle + np.abs(costs) @ half
-        rest = costs - vertex.gradient
-        return vertex.offset + rest @ middle + np.abs(rest) @ half
+        bounds = [proof.offset for proof in proofs] + rest @ middle + np.abs(rest) @ half
+        return float(bounds.min())
+
+    def box_bounds(self, costs: Array) -> Array:
+        """Return the largest values of functionals, [..., V], over the box."""
+        middle, half = (self.upper + self.lower) / 2.0, (self.upper - self.lower) / 2.0
+        return costs @ middle + np.abs(costs) @ half
 
     def _violated(self, excess: Array) -> NDArray[np.intp]:
         rows: list[NDArray[np.intp]] = []
@@ -204,12 +209,12 @@ class _Search:
     def threshold_um(self) -> float:
         return max((1.0 + self.gap) * self.best.low_um, self.limit_um)
 
-    def height(self, node: int, direction: Array) -> float:
+    def maximise(self, node: int, direction: Array) -> Vertex:
         """Maximise one direction at a node; improve the best machine, its direction iterated."""
-        first, cost = np.nan, direction @ self.gains[node]
+        first, cost = None, direction @ self.gains[node]
         while True:
             vertex = self.polytope.maximise(cost)
-            first = vertex.maximum if np.isnan(first) else first
+            first = first or vertex
             errors = self.gains @ vertex.values
             norm = np.linalg.norm(errors, axis=1)
             at = int(np.argmax(norm))
@@ -220,36 +225,48 @@ class _Search:
 
     def close(self, node: int, check_cancelled: Callable[[], None]) -> float:
         """Return an upper bound of |E| at a node, at most the threshold."""
-        triangles = icosahedron()
-        if self.polytope.is_symmetric:
-            triangles = triangles[triangles.sum(axis=1) @ [1.0, 1e-3, 1e-6] > 0.0]
-        heights: dict[bytes, float] = {}  # of solved directions
+        triangles, is_symmetric = icosahedron(), self.polytope.is_symmetric
+        if is_symmetric:
+            triangles = triangles[triangles.sum(axis=1) @ SIDE > 0.0]
+        proofs = [Vertex(np.zeros(0), 0.0, np.zeros(self.gains.shape[2]), 0.0)]
+        upper, solved = dict[bytes, float](), set[bytes]()  # by direction
 
-        def height(corner: Array, *, solve: bool) -> float:
-            sign = -1.0 if self.polytope.is_symmetric and corner @ [1.0, 1e-3, 1e-6] < 0.0 else 1.0
-            key = np.round(sign * corner, 9).tobytes()
-            if key not in heights and solve:
-                heights[key] = self.height(node, corner)
-                check_cancelled()
-            bounds = self.polytope.bound((corner @ self.gains[node])[None])
-            return heights.get(key, float(bounds[0]))
+        def key_of(corner: Array) -> bytes:
+            sign = np.sign(corner @ SIDE) if is_symmetric else 1.0
+            return (np.round(sign * corner, 9) + 0.0).tobytes()
 
         def entry(triangle: Array) -> tuple[float, int, Array]:
-            bound = cone_bound(triangle, np.array([height(c, solve=False) for c in triangle]))
-            return -bound, next(number), triangle
+            for corner in triangle:
+                key = key_of(corner)
+                if key not in solved:
+                    cost = np.frombuffer(key) @ self.gains[node]
+                    bound = self.polytope.bound(cost, proofs)
+                    upper[key] = min(upper.get(key, np.inf), bound)
+            heights = np.array([upper[key_of(corner)] for corner in triangle])
+            return -cone_bound(triangle, heights), next(number), triangle
 
         number = count()
         queue = [entry(triangle) for triangle in triangles]
         heapify(queue)
         while -queue[0][0] > self.threshold_um:
             triangle = heappop(queue)[2]
-            exact = np.array([height(corner, solve=True) for corner in triangle])
-            if cone_bound(triangle, exact) <= self.threshold_um:
+            keys = [key_of(corner) for corner in triangle]
+            unsolved = [key for key in keys if key not in solved]
+            if unsolved:
+                key = max(unsolved, key=upper.__getitem__)
+                proofs.append(self.maximise(node, np.frombuffer(key)))
+                upper[key] = proofs[-1].maximum
+                solved.add(key)
+                check_cancelled()
                 heappush(queue, entry(triangle))
                 continue
-            middle = triangle + np.roll(triangle, -1, axis=0)
-            middle /= np.linalg.norm(middle, axis=1, keepdims=True)
-            (a, b, c), (ab, bc, ca) = triangle, middle
+            sums = triangle + np.roll(triangle, -1, axis=0)
+            lengths = np.linalg.norm(sums, axis=1)
+            (a, b, c), (ab, bc, ca) = triangle, sums / lengths[:, None]
+            for side, corner in enumerate((ab, bc, ca)):
+                height = (upper[keys[side]] + upper[keys[side - 2]]) / lengths[side]
+                key = key_of(corner)
+                upper[key] = min(upper.get(key, np.inf), height)
             for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)):
                 heappush(queue, entry(np.array(part)))
         return -queue[0][0]
@@ -285,8 +302,7 @@ def find_largest_error(
     """
     search, high = _Search(polytope, gains, gap, limit_um), 0.0
     triangles = icosahedron()
-    corners = triangles.reshape(-1, 3)
-    heights = np.stack([polytope.bound(corners @ each) for each in gains]).reshape(-1, 20, 3)
+    heights = np.stack([polytope.box_bounds(triangles @ each) for each in gains])
     bounds = np.array(
         [max(cone_bound(t, h) for t, h in zip(triangles, each, strict=True)) for each in heights]
     )
