@@ -214,7 +214,8 @@ def find_worst_machine(
         )
     except InfeasibleError as error:
         names = _conflict(curves, constraints, watch)
-        raise OptionError(f"{error}: {', '.join(names)} exclude each other") from None
+        verb = "cannot be passed" if len(names) == 1 else "exclude each other"
+        raise OptionError(f"{error}: {', '.join(names)} {verb}") from None
     result = _result(curves, worst, without.low_um, list(zip(tests, constraints, strict=True)))
     if request.keep_um is not None:
         factor = find_factor(curves, constraints, worst, request.keep_um, watch)
