@@ -49,7 +49,7 @@ def build_constraint(
     key = entry.quantity or next(iter(forms), "")
     if key not in forms:
         raise OptionError(
-            f"{entry.name}: {key or 'its result'} is not linear in the errors; expected one of"
+            f"{entry.name}: {key or 'its result'} has no linear form; expected one of"
             f" {', '.join(forms)}"
         )
     if not key.endswith(f"_{entry.unit}"):

@@ -126,9 +126,9 @@ class BenchTest(Analysis):
         """Evaluate readings, [m], µm or µrad, by the formulas of the standard."""
 
     def linear_forms(self, plan: BenchPlan, readings: Array) -> Mapping[str, LinearForm]:  # noqa: ARG002 - for subclasses
-        """Build the forms of the quantities that are linear in the readings, the first the usual.
+        """Build the forms of quantities that are linear in the readings, the usual one first.
 
-        Readings are [m], or responses, [m, V]. Statistics such as 2σ or an RMS have no form.
+        Readings of one run are [m], or responses, [m, V]. 2σ or an RMS have no form.
         """
         return {}
 

@@ -93,8 +93,8 @@ def test_unknown_bundled_plan(scene):
     [
         ({"test": "circular", "limit_um": 8, "radius_mm": 5000}, "leaves the working volume"),
         ({"test": "rotary-axis", "axis": "A", "limit_um": 8}, "unknown axis 'A'"),
-        ({"test": "positioning", "limit_um": 8, "quantity": "R_um"}, "R_um is not linear"),
-        ({"test": "r-test", "limit_um": 8, "quantity": "rms_fitted_um"}, "is not linear"),
+        ({"test": "positioning", "limit_um": 8, "quantity": "R_um"}, "R_um has no linear form"),
+        ({"test": "r-test", "limit_um": 8, "quantity": "rms_fitted_um"}, "has no linear form"),
         ({"test": "circular", "limit_urad": 8}, "limit_urad; .* expects limit_um"),
     ],
 )

@@ -169,25 +169,20 @@ class BallPlate(BenchTest):
         residual = np.stack(np.split(fit_setup(plan, readings)[1], 3), axis=1)  # [b, 3, ...]
         count = len(residual)
         nominal = np.stack([plan.marks[f"seen_{axis}_mm"] for axis in "xyz"], -1)[:count]
-        number, columns = plan.marks["position"][:count], ["XYZ".index(name) for name in self.plane]
+        number, across = (
+            plan.marks["position"][:count],
+            "XYZ".index(({*"XYZ"} - {*self.plane}).pop()),
+        )
         lengths: list[Array] = []
-        coefficients: list[Array] = []
         for index in np.unique(number):
             at, deviation = nominal[number == index], residual[number == index]
             first, second = np.triu_indices(len(at), 1)
             apart = at[first] - at[second]
             apart /= np.linalg.norm(apart, axis=-1, keepdims=True)
             lengths.append(np.einsum("pc,pc...->p...", apart, deviation[first] - deviation[second]))
-            design = np.column_stack([np.ones(len(at)), at[:, columns]])
-            inverse = np.linalg.pinv(design)[1:]
-            coefficients.append(np.tensordot(inverse, 1e3 * deviation[:, columns], 1))
-        affine = np.mean(coefficients, axis=0)  # [2, 2, ...]; along, of
         return {
             "length_error_um": absolute(*lengths),
-            "flatness_um": largest_range(residual[:, 3 - sum(columns)], number),
-            "squareness_urad": absolute((affine[0, 1] + affine[1, 0])[None]),
-            f"scale_{self.plane[0]}_um_per_m": absolute(affine[0, :1]),
-            f"scale_{self.plane[1]}_um_per_m": absolute(affine[1, 1:]),
+            "flatness_um": largest_range(residual[:, across], number),
         }
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:

@@ -131,18 +131,10 @@ def _circle_radius(plan: BenchPlan, readings: Array) -> Array:
 
 
 def circle_forms(plan: BenchPlan, readings: Array) -> dict[str, LinearForm]:
-    """Build the forms of circular deviation, radius and, where they are fitted, of the ellipse."""
-    sense = plan.marks["sense"]
-    fit, radial = fit_centre(plan, readings, np.ones(len(sense), dtype=bool))
+    """Build the forms of circular deviation, radius and the sin 2φ part of a full circle."""
+    fit, radial = fit_centre(plan, readings, np.ones(plan.readings, dtype=bool))
     forms = {"circular_deviation_um": zone(radial), "radius_um": absolute(fit[:1])}
-    for sign, word in SENSES.items():
-        if (sense == sign).any():
-            key = f"circular_deviation_{word.replace('-', '_')}_um"
-            forms[key] = zone(fit_centre(plan, readings, sense == sign)[1])
-    if len(fit) == 5:
-        forms["radius_difference_um"] = absolute(2.0 * fit[3:4])
-        forms["shear_um"] = absolute(fit[4:])
-    return forms
+    return forms | ({"shear_um": absolute(fit[4:])} if len(fit) == 5 else {})
 
 
 def _hysteresis(angle_deg: Array, sense: Array, radial: Array) -> float:
@@ -324,13 +316,10 @@ class Circular(BenchTest):
 
     def linear_forms(self, plan: BenchPlan, readings: Array) -> Mapping[str, LinearForm]:
         forms = circle_forms(plan, readings)
-        radius_difference, shear = (
-            forms.pop(key, None) for key in ("radius_difference_um", "shear_um")
-        )
-        if radius_difference and shear and not self.rotary:
+        shear = forms.pop("shear_um", None)
+        if shear and not self.rotary:
             per_shear = 2.0 / (self.radius_mm * UM_PER_MM_URAD)
             forms["squareness_urad"] = absolute(per_shear * shear.rows)
-            forms["radius_difference_um"] = radius_difference
         return forms
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:

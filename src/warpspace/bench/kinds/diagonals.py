@@ -10,7 +10,7 @@ from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ALONG, DataColumn, ReadingsFile
-from warpspace.bench.kinds.positioning import mean_by, target_statistics
+from warpspace.bench.kinds.positioning import target_statistics
 from warpspace.bench.linear_form import LinearForm, absolute, largest_range, zone
 from warpspace.bench.placing import PLANES, find_plane, following_axes, tool_offset, tool_points
 from warpspace.bench.plan import BenchPlan, IndexArray, Outcome, build_outcome, build_plan
@@ -271,28 +271,18 @@ class Diagonals(BenchTest):
         return build_outcome(quantities, {"diagonals": rows})
 
     def linear_forms(self, plan: BenchPlan, readings: Array) -> Mapping[str, LinearForm]:
-        number, travel_sign = plan.marks["diagonal"], plan.marks["travel_sign"]
-        position = np.round(plan.marks["position_mm"], 3)
-        reversals: list[Array] = []
+        number, position = plan.marks["diagonal"], np.round(plan.marks["position_mm"], 3)
         lengths: list[Array] = []
         for index in range(len(self.names)):
-            chosen = number == index
-            mean = mean_by(position[chosen], readings[chosen])
-            lengths.append(mean[-1] - mean[0])
-            forward, backward = (chosen & (travel_sign == sign) for sign in (1.0, -1.0))
-            if backward.any():
-                difference = mean_by(position[forward], readings[forward])
-                difference -= mean_by(position[backward], readings[backward])
-                reversals.append(difference)
-        forms = {
+            at, values = position[number == index], readings[number == index]
+            ends = (values[at == end].mean(axis=0) for end in (at.min(), at.max()))
+            lengths.append(-np.subtract(*ends))
+        squareness = squareness_of_diagonals(plan, self.names, np.stack(lengths))
+        return {
             "E_um": largest_range(readings, number),
             "length_difference_um": zone(np.stack(lengths)),
+            **{f"squareness_{key}_urad": absolute(row[None]) for key, row in squareness.items()},
         }
-        if reversals:
-            forms["B_um"] = absolute(*reversals)
-        for key, value in squareness_of_diagonals(plan, self.names, np.stack(lengths)).items():
-            forms[f"squareness_{key}_urad"] = absolute(value[None])
-        return forms
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []

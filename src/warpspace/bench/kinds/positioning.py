@@ -9,7 +9,7 @@ from warpspace.analysis.blocks import Band, Curve, Lines
 from warpspace.analysis.options import Axis, option
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import DataColumn, ReadingsFile
-from warpspace.bench.linear_form import LinearForm, absolute, zone
+from warpspace.bench.linear_form import LinearForm, zone
 from warpspace.bench.placing import axis_line, motion_direction, tool_points
 from warpspace.bench.plan import BenchPlan, Outcome, build_outcome, build_plan
 from warpspace.exceptions import OptionError, UnknownNameError
@@ -47,14 +47,6 @@ def target_statistics(target: Array, travel_sign: Array, readings: Array) -> Tar
         free = np.where(is_measured, np.maximum(count - 1, 1), np.nan)
         deviation[row] = np.sqrt(squares / free)
     return TargetStatistics(targets, mean, deviation)
-
-
-def mean_by(label: Array, readings: Array) -> Array:
-    """Compute the mean of the readings, [m, ...], of each label, [m], in ascending order."""
-    labels, index, count = np.unique(label, return_inverse=True, return_counts=True)
-    total = np.zeros((len(labels), *readings.shape[1:]))
-    np.add.at(total, index.reshape(-1), readings)
-    return (total.T / count).T
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,24 +158,7 @@ class Positioning(BenchTest):
         return build_outcome(rows, {"targets": _target_rows(statistics, unit)})
 
     def linear_forms(self, plan: BenchPlan, readings: Array) -> Mapping[str, LinearForm]:
-        suffix = "um" if "zero_um" in plan.setup else "urad"
-        target, sign = np.round(plan.marks["target"], 6), plan.marks["travel_sign"]
-        by_direction = [
-            mean_by(target[sign == each], readings[sign == each])
-            for each in (FORWARD, BACKWARD)
-            if (sign == each).any()
-        ]
-        forms = {f"E_{suffix}": zone(np.concatenate(by_direction))}
-        if len(by_direction) == 2:
-            forward, backward = by_direction
-            forms |= {
-                f"M_{suffix}": zone((forward + backward) / 2.0),
-                f"B_{suffix}": absolute(forward - backward),
-                f"B_mean_{suffix}": absolute((forward - backward).mean(axis=0, keepdims=True)),
-                f"E_forward_{suffix}": zone(forward),
-                f"E_backward_{suffix}": zone(backward),
-            }
-        return forms
+        return {"E_um" if "zero_um" in plan.setup else "E_urad": zone(readings)}
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []

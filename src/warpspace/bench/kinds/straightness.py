@@ -11,7 +11,6 @@ from warpspace.analysis.options import Axis, option
 from warpspace.bench import placing
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ALONG, DataColumn, ReadingsFile
-from warpspace.bench.kinds.positioning import mean_by
 from warpspace.bench.linear_form import LinearForm, absolute, project_out, zone
 from warpspace.bench.plan import BenchPlan, Outcome, build_outcome, build_plan
 from warpspace.exceptions import OptionError
@@ -50,9 +49,17 @@ def fit_lines(position_mm: Array, readings_um: Array) -> tuple[Array, Array, dic
     return x, mean, lines
 
 
+def mean_by(position: Array, readings: Array) -> tuple[Array, Array]:
+    """Compute the mean readings, [p, ...], at each position; both ascend."""
+    x, index, count = np.unique(np.round(position, 6), return_inverse=True, return_counts=True)
+    total = np.zeros((len(x), *readings.shape[1:]))
+    np.add.at(total, index.reshape(-1), readings)
+    return x, (total.T / count).T
+
+
 def line_forms(position_mm: Array, readings: Array) -> dict[str, LinearForm]:
     """Build the forms of the deviation from each reference line."""
-    x, mean = np.unique(np.round(position_mm, 6)), mean_by(np.round(position_mm, 6), readings)
+    x, mean = mean_by(position_mm, readings)
     return {
         "end_points": zone(mean - np.multiply.outer(x, end_slope(x, mean))),
         "least_squares": zone(project_out(mean, np.ones(len(x)), x)),
@@ -274,7 +281,7 @@ class Squareness(BenchTest):
         for index, axis in enumerate(self.plane):
             arm = plan.marks["line"] == index
             position, values = plan.marks["along_mm"][arm], readings[arm]
-            x, mean = np.unique(np.round(position, 6)), mean_by(np.round(position, 6), values)
+            x, mean = mean_by(position, values)
             away = x - x.mean()
             end_points.append(1e3 * end_slope(x, mean))
             least_squares.append(1e3 * np.tensordot(away, mean, 1) / (away @ away))
