@@ -299,7 +299,7 @@ def test_dense_volume_has_no_larger_error_than_the_knots(tmp_path):
     curves = ErrorCurves(scene, KNOTS)
     rng = np.random.default_rng(5)
     for values in rng.uniform(curves.lower, curves.upper, (5, len(curves.lower))):
-        machine = curves.machine(values)
+        machine = curves.build_scene(values)
         nodes = np.linalg.norm(curves.gains @ values, axis=-1).max()
         dense = warpspace.evaluate(machine, grid=33).norm_um.max()
         assert dense == pytest.approx(nodes, rel=1e-9)

@@ -8,7 +8,7 @@ import numpy as np
 
 from warpspace.acceptance.error_curves import ErrorCurves
 from warpspace.acceptance.next_tests import NextTest, build_constraint, find_next_tests
-from warpspace.acceptance.plans import UNITS, AcceptanceTest, default_plan, load_plan, plan_names
+from warpspace.acceptance.plans import UNITS, PlannedTest, default_plan, load_plan, plan_names
 from warpspace.acceptance.polytope import Constraint, InfeasibleError, LargestError
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import NO_JSON, Analysis, Change, ProgressCallback, Result
@@ -179,7 +179,7 @@ class AcceptanceResult(Result):
 
 def find_worst_machine(
     scene: Scene,
-    tests: Sequence[AcceptanceTest],
+    tests: Sequence[PlannedTest],
     request: Acceptance | None = None,
     watch: ProgressCallback = lambda _share: None,
 ) -> AcceptanceResult:
@@ -188,7 +188,7 @@ def find_worst_machine(
     Parameters
     ----------
     scene : Scene
-    tests : sequence of AcceptanceTest
+    tests : sequence of PlannedTest
         None for the machines within tolerance.
     request : Acceptance, optional
         Knots and slope.
@@ -205,7 +205,7 @@ def find_worst_machine(
     """
     request = request or Acceptance()
     curves = ErrorCurves(scene, request.knots, request.slope)
-    constraints = [build_constraint(curves, entry, watch) for entry in tests]
+    constraints = [build_constraint(curves, planned, watch) for planned in tests]
     plain = not (request.next_count or request.keep_um)
     without = curves.find_largest((), lambda part: watch(0.1 * part))
     try:
@@ -216,14 +216,14 @@ def find_worst_machine(
         names = _conflict(curves, constraints, watch)
         verb = "cannot be passed" if len(names) == 1 else "exclude each other"
         raise OptionError(f"{error}: {', '.join(names)} {verb}") from None
-    result = _result(curves, worst, without.low_um, list(zip(tests, constraints, strict=True)))
+    report = _report(curves, worst, without.low_um, list(zip(tests, constraints, strict=True)))
     if request.keep_um is not None:
         factor = find_factor(curves, constraints, worst, request.keep_um, watch)
-        result = replace(result, keep_um=request.keep_um, factor=factor)
+        report = replace(report, keep_um=request.keep_um, factor=factor)
     if request.next_count:
         steps = find_next_tests(curves, tests, constraints, worst, request.next_count, watch)
-        result = replace(result, next=tuple(steps))
-    return result
+        report = replace(report, next=tuple(steps))
+    return report
 
 
 def find_factor(
@@ -271,34 +271,34 @@ def _conflict(
     return [constraint.name for constraint in remaining]
 
 
-def _result(
+def _report(
     curves: ErrorCurves,
     worst: LargestError,
     without_um: float,
-    tests: Sequence[tuple[AcceptanceTest, Constraint]],
+    tests: Sequence[tuple[PlannedTest, Constraint]],
 ) -> AcceptanceResult:
-    machine = curves.machine(worst.values)
+    machine = curves.build_scene(worst.machine)
     shape = curves.grid.shape
     at = {
         axis: float(np.broadcast_to(values, shape).flat[worst.node])
         for axis, values in curves.grid.coordinates.items()
     }
     direction = worst.error_um / max(worst.low_um, 1e-30)
-    parts = direction @ curves.gains[worst.node] * worst.values
+    parts = direction @ curves.gains[worst.node] * worst.machine
     contributions = {key: float(part.sum()) for key, part in curves.by_key(parts).items()}
     ordered = sorted(contributions.items(), key=lambda item: -abs(item[1]))
-    values: list[TestValue] = []
-    for entry, constraint in tests:
+    rows: list[TestValue] = []
+    for planned, constraint in tests:
         first, exact = (
-            abs(run_test(machine, entry.test, exact=exact).model.outcome[constraint.quantity])
+            abs(run_test(machine, planned.test, exact=exact).model.outcome[constraint.quantity])
             for exact in (False, True)
         )
-        values.append(TestValue(entry.name, first, entry.limit, UNITS[entry.unit], exact))
+        rows.append(TestValue(planned.name, first, planned.limit, UNITS[planned.unit], exact))
     exact_um = evaluate_field(
         machine.model, machine.errors, {axis: np.asarray(q) for axis, q in at.items()},
         machine.view(), curves.grid.point_mm.reshape(-1, 3)[worst.node], exact=True,
     ).error_um  # fmt: skip
-    errors: dict[str, Array] = curves.by_key(worst.values)
+    errors: dict[str, Array] = curves.by_key(worst.machine)
     title = f"{curves.scene.title}, worst machine that passes"
     return AcceptanceResult(
         scene=curves.scene,
@@ -308,7 +308,7 @@ def _result(
         at=at,
         direction=(float(direction[0]), float(direction[1]), float(direction[2])),
         without_tests_um=without_um,
-        tests=tuple(values),
+        tests=tuple(rows),
         errors={key: float(part[np.argmax(np.abs(part))]) for key, part in errors.items()},
         contributions_um=dict(ordered),
         second_order=compare_orders(worst.error_um, exact_um),

@@ -115,22 +115,21 @@ class ErrorCurves:
                     responses[..., columns[key, knot]] = response[..., row]
         return responses
 
-    def _curve(self, key: str, values: Sequence[float] | Array) -> ErrorFunction:
+    def _curve(self, key: str, at_knots: Array) -> ErrorFunction:
         span = self.scene.axis_span(parameter(key).axis)
         if parameter(key).is_constant:
-            return Constant(span, float(values[0]))
-        at = np.linspace(*span, self.knots)
-        points = zip(at.tolist(), np.asarray(values).tolist(), strict=True)
-        return TableCurve(span, tuple(points))
+            return Constant(span, float(at_knots[0]))
+        positions = np.linspace(*span, self.knots).tolist()
+        return TableCurve(span, tuple(zip(positions, at_knots.tolist(), strict=True)))
 
-    def by_key(self, values: Array) -> dict[str, Array]:
-        """Split values, [V], into those of each error."""
+    def by_key(self, machine: Array) -> dict[str, Array]:
+        """Split a machine, [V], into its errors."""
         keys = np.array([key for key, _ in self.variables])
-        return {key: values[keys == key] for key in self.keys}
+        return {key: machine[keys == key] for key in self.keys}
 
-    def machine(self, values: Array) -> Scene:
-        """Return the scene of one machine."""
-        curves = {key: self._curve(key, part) for key, part in self.by_key(values).items()}
+    def build_scene(self, machine: Array) -> Scene:
+        """Return the scene of one machine, [V]."""
+        curves = {key: self._curve(key, part) for key, part in self.by_key(machine).items()}
         return replace(self.scene, errors=ErrorSet(curves))
 
     def polytope(self, constraints: Sequence[Constraint]) -> Polytope:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from warpspace.acceptance.error_curves import ErrorCurves
-from warpspace.acceptance.plans import UNITS, AcceptanceTest
+from warpspace.acceptance.plans import UNITS, PlannedTest
 from warpspace.acceptance.polytope import (
     Constraint,
     InfeasibleError,
@@ -37,30 +37,30 @@ class NextTest:
 
 
 def build_constraint(
-    curves: ErrorCurves, entry: AcceptanceTest, watch: ProgressCallback
+    curves: ErrorCurves, planned: PlannedTest, watch: ProgressCallback
 ) -> Constraint:
     """Build the constraint of a test of a plan; raise OptionError where it cannot be used."""
     watch(0.0)
     try:
-        plan = entry.test.plan(curves.scene)
-        forms = entry.test.linear_forms(plan, curves.readings(plan))
+        plan = planned.test.plan(curves.scene)
+        forms = planned.test.linear_forms(plan, curves.readings(plan))
     except WarpspaceError as error:
-        raise OptionError(f"{entry.name}: {error}") from error
-    key = entry.quantity or next(iter(forms), "")
+        raise OptionError(f"{planned.name}: {error}") from error
+    key = planned.quantity or next(iter(forms), "")
     if key not in forms:
         raise OptionError(
-            f"{entry.name}: {key or 'its result'} has no linear form; expected one of"
+            f"{planned.name}: {key or 'its result'} has no linear form; expected one of"
             f" {', '.join(forms)}"
         )
-    if not key.endswith(f"_{entry.unit}"):
+    if not key.endswith(f"_{planned.unit}"):
         unit = next(unit for unit in UNITS if key.endswith(f"_{unit}"))
-        raise OptionError(f"{entry.name}: limit_{entry.unit}; {key} expects limit_{unit}")
-    return Constraint(entry.name, forms[key], entry.limit, key)
+        raise OptionError(f"{planned.name}: limit_{planned.unit}; {key} expects limit_{unit}")
+    return Constraint(planned.name, forms[key], planned.limit, key)
 
 
 def find_next_tests(
     curves: ErrorCurves,
-    tests: Sequence[AcceptanceTest],
+    tests: Sequence[PlannedTest],
     constraints: Sequence[Constraint],
     worst: LargestError,
     count: int,
@@ -71,59 +71,59 @@ def find_next_tests(
     Only a test that the worst machine fails can reduce the bound. Its reduction is estimated with a
     coarse search; the bound of the best one is that of the fine search.
     """
-    untimed = [entry.name for entry in tests if entry.minutes is None]
+    untimed = [planned.name for planned in tests if planned.minutes is None]
     if untimed:
         raise OptionError(f"{{next_count}}: {', '.join(untimed)}: expected minutes in the plan")
     candidates = list(_candidates(curves, tests, watch))
     present, limit_um = list(constraints), curves.scene.limit_um or 0.0
     for step in range(count):
         ranking: list[tuple[float, int]] = []
-        for number, (entry, constraint) in enumerate(candidates):
+        for number, (planned, constraint) in enumerate(candidates):
             share = (step + number / len(candidates)) / count
             watch(0.6 + 0.4 * share)
             if passes(worst, constraint):
                 continue
             coarse = curves.find_largest([*present, constraint], lambda _: watch(0.6), COARSE_GAP)
             reduction = worst.low_um - coarse.low_um
-            ranking.append((reduction / (entry.minutes or 1.0), number))
+            ranking.append((reduction / (planned.minutes or 1.0), number))
         if not ranking or worst.high_um <= limit_um:
             return
-        entry, constraint = candidates.pop(max(ranking)[1])
+        planned, constraint = candidates.pop(max(ranking)[1])
         present.append(constraint)
         worst = curves.find_largest(present, lambda _: watch(0.6))
-        name, minutes = entry.test.name, entry.minutes or 1.0
-        yield NextTest(name, entry.options, worst.high_um, minutes, entry.name)
+        name, minutes = planned.test.name, planned.minutes or 1.0
+        yield NextTest(name, planned.options, worst.high_um, minutes, planned.name)
 
 
 def passes(worst: LargestError, constraint: Constraint) -> bool:
     try:
-        Polytope(worst.values, worst.values, [constraint]).maximise(0.0 * worst.values)
+        Polytope(worst.machine, worst.machine, [constraint]).maximise(0.0 * worst.machine)
     except InfeasibleError:
         return False
     return True
 
 
 def _candidates(
-    curves: ErrorCurves, tests: Sequence[AcceptanceTest], watch: ProgressCallback
-) -> Iterator[tuple[AcceptanceTest, Constraint]]:
+    curves: ErrorCurves, tests: Sequence[PlannedTest], watch: ProgressCallback
+) -> Iterator[tuple[PlannedTest, Constraint]]:
     """Vary axes, planes and directions of each kind of test, and the place of axes at rest."""
-    scene, present = curves.scene, {entry.test for entry in tests}
-    for entry in {(entry.test.name, entry.unit): entry for entry in tests}.values():
-        settings = {setting.name: setting for setting in type(entry.test).settings()}
+    scene, present = curves.scene, {planned.test for planned in tests}
+    for planned in {(planned.test.name, planned.unit): planned for planned in tests}.values():
+        settings = {setting.name: setting for setting in type(planned.test).settings()}
         choices = {
             name: settings[name].choices or tuple(scene.machine.axes)
             for name in VARIED
             if name in settings
         }
-        for values in product(*choices.values()):
-            chosen = dict(zip(choices, values, strict=True))
-            options = {**entry.options, **chosen}
-            for at in _places(scene, replace(entry.test, **chosen)):
-                test = replace(entry.test, **chosen, at=tuple(at.items()) or entry.test.at)
+        for combination in product(*choices.values()):
+            chosen = dict(zip(choices, combination, strict=True))
+            options = {**planned.options, **chosen}
+            for at in _places(scene, replace(planned.test, **chosen)):
+                test = replace(planned.test, **chosen, at=tuple(at.items()) or planned.test.at)
                 if test in present:
                     continue
                 present.add(test)
-                varied = replace(entry, test=test, options=options | ({"at": at} if at else {}))
+                varied = replace(planned, test=test, options=options | ({"at": at} if at else {}))
                 with suppress(OptionError):  # a test that the machine cannot run
                     yield varied, build_constraint(curves, varied, watch)
 

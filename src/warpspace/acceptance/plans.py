@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from warpspace.bench.base import BenchTest, bench_names, find_test
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError, WarpspaceError
@@ -18,7 +18,7 @@ UNITS = {"um_per_m": "µm/m", "um": "µm", "urad": "µrad"}
 
 
 @dataclass(frozen=True)
-class AcceptanceTest:
+class PlannedTest:
     """A test with the limit of one of its quantities."""
 
     test: BenchTest
@@ -45,7 +45,7 @@ def default_plan(scene: Scene) -> str:
     return name if name in plan_names() else "iso_3_axes"
 
 
-def load_plan(name: str, scene: Scene) -> tuple[AcceptanceTest, ...]:
+def load_plan(name: str, scene: Scene) -> tuple[PlannedTest, ...]:
     """Read a plan, a file or a bundled one by name; raise SceneError with all its problems."""
     path = Path(name)
     if path.suffix != ".toml":
@@ -55,18 +55,18 @@ def load_plan(name: str, scene: Scene) -> tuple[AcceptanceTest, ...]:
     return parse_plan(read_text(path, MAX_SCENE_BYTES), str(path), scene)
 
 
-def parse_plan(text: str, source: str, scene: Scene) -> tuple[AcceptanceTest, ...]:
+def parse_plan(text: str, source: str, scene: Scene) -> tuple[PlannedTest, ...]:
     document = parse_toml(text, source)
     entries = document.pop("acceptance", None)
     document.pop("title", None)
     problems = [f"{key}: unknown; expected title and [[acceptance]]" for key in document]
-    tests: list[AcceptanceTest] = []
+    tests: list[PlannedTest] = []
     if not isinstance(entries, list) or not 0 < len(entries) <= MAX_TESTS:
         problems.append(f"acceptance: expected 1 to {MAX_TESTS} tests [[acceptance]]")
         entries = []
-    for number, entry in enumerate(entries, start=1):
+    for number, table in enumerate(entries, start=1):
         try:
-            tests.append(_read_test(entry, scene))
+            tests.append(_read_test(table, scene))
         except WarpspaceError as error:
             problems.append(f"acceptance[{number}]: {error}")
     if problems:
@@ -74,10 +74,10 @@ def parse_plan(text: str, source: str, scene: Scene) -> tuple[AcceptanceTest, ..
     return tuple(tests)
 
 
-def _read_test(entry: object, scene: Scene) -> AcceptanceTest:
-    if not isinstance(entry, dict):
-        raise OptionError(f"{spell_value(entry)}; expected a table")
-    fields = dict(entry)
+def _read_test(table: object, scene: Scene) -> PlannedTest:
+    if not isinstance(table, dict):
+        raise OptionError(f"{spell_value(table)}; expected a table")
+    fields = dict(table)
     name = fields.pop("test", None)
     if not isinstance(name, str) or name not in bench_names():
         raise UnknownNameError("test", str(name), bench_names())
@@ -93,22 +93,22 @@ def _read_test(entry: object, scene: Scene) -> AcceptanceTest:
         minutes = _positive(minutes, f"{name}: minutes", MAX_MINUTES)
     quantity = fields.pop("quantity", "")
     settings = {setting.name: setting for setting in kind.settings()}
-    values: dict[str, Any] = {}
-    for key, value in fields.items():
+    options: dict[str, Any] = {}
+    for key, raw in fields.items():
         if key not in settings:
             raise UnknownNameError(f"option of {name}", key, settings)
-        values[key] = settings[key].read(_text(value), scene)
-    return AcceptanceTest(kind(**values), fields, limit, unit, str(quantity), minutes)
+        options[key] = settings[key].read(_text(raw), scene)
+    return PlannedTest(kind(**options), fields, limit, unit, str(quantity), minutes)
 
 
-def _positive(value: object, what: str, largest: float) -> float:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not (is_number and 0.0 < float(value) <= largest):
-        raise OptionError(f"{what}: {spell_value(value)}; expected above 0, at most {largest:g}")
-    return float(value)
+def _positive(raw: object, name: str, largest: float) -> float:
+    if isinstance(raw, int | float) and not isinstance(raw, bool) and 0.0 < raw <= largest:
+        return float(raw)
+    raise OptionError(f"{name}: {spell_value(raw)}; expected above 0, at most {largest:g}")
 
 
-def _text(value: object) -> str:
-    if isinstance(value, Mapping):
-        return ",".join(f"{key}={item}" for key, item in value.items())
-    return ",".join(map(str, value)) if isinstance(value, list) else str(value)
+def _text(raw: Any) -> str:
+    """Spell a value of TOML as on the command line."""
+    if isinstance(raw, Mapping):
+        return ",".join(f"{key}={raw[key]}" for key in cast("Mapping[str, object]", raw))
+    return ",".join(map(str, raw)) if isinstance(raw, list) else str(raw)

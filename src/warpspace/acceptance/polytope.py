@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import highspy
 import numpy as np
-from numpy.typing import NDArray
 
 from warpspace.bench.linear_form import LinearForm
 from warpspace.exceptions import OptionError
@@ -43,14 +42,14 @@ class Vertex(NamedTuple):
     c · v over the polytope (weak duality).
     """
 
-    values: Array  # [V], µm or µrad; of the errors
+    point: Array  # [V], µm or µrad
     maximum: float
     gradient: Array  # [V]
     offset: float
 
 
 class Polytope:
-    """Values of errors within a box, [V], that pass tests.
+    """Machines within a box, [V], that pass tests.
 
     The linear program keeps its basis from one cost vector to the next. Rows of tests are added
     where the solution violates them, so that it stays small.
@@ -58,102 +57,78 @@ class Polytope:
 
     def __init__(self, lower: Array, upper: Array, constraints: Sequence[Constraint]) -> None:
         self.lower, self.upper = lower, upper
-        width, blocks = len(lower), list[Array]()
-        unknowns = sum(constraint.form.free.shape[1] for constraint in constraints)
-        at, sizes = width, list[Array]()
-        for constraint in constraints:
-            form = constraint.form
-            block = np.zeros((len(form.rows), width + unknowns))
-            block[:, :width] = form.rows
-            block[:, at : at + form.free.shape[1]] = -form.free
-            at += form.free.shape[1]
-            block = block[np.unique(np.round(block, 9), axis=0, return_index=True)[1]]
-            blocks.append(block)
-            sizes.append(np.full(len(block), constraint.limit / form.factor))
-        self._rows = np.concatenate([np.zeros((0, width + unknowns)), *blocks])
+        column = len(lower)
+        width = column + sum(each.form.free.shape[1] for each in constraints)
+        blocks = [np.zeros((0, width))]
+        for form, limit in ((each.form, each.limit) for each in constraints):
+            block = np.zeros((len(form.rows), width))
+            block[:, : len(lower)] = form.rows
+            block[:, column : column + form.free.shape[1]] = -form.free
+            column += form.free.shape[1]
+            block *= form.factor / limit  # within ± 1
+            blocks.append(block[np.unique(np.round(block, 9), axis=0, return_index=True)[1]])
+        self._rows = np.concatenate(blocks)
         if len(self._rows) > MAX_ROWS:
-            raise OptionError(f"tests with {len(self._rows):,} readings; expected {MAX_ROWS:,}")
-        self._sizes = np.concatenate([np.zeros(0), *sizes])
+            raise OptionError(f"the tests have {len(self._rows):,} rows; expected {MAX_ROWS:,}")
         self._test = np.repeat(np.arange(len(blocks)), [len(block) for block in blocks])
         self._added = np.zeros(0, dtype=np.intp)
+        free, none = np.full(width - len(lower), np.inf), np.zeros(0, dtype=np.int32)
         self._solver = highspy.Highs()
         self._solver.silent()
         self._solver.setOptionValue("threads", 1)
-        free = np.full(unknowns, np.inf)
-        empty = np.zeros(0)
         self._solver.addCols(
-            width + unknowns, np.zeros(width + unknowns), np.append(lower, -free),
-            np.append(upper, free), 0, empty.astype(np.int32), empty.astype(np.int32), empty,
+            width, np.zeros(width), np.append(lower, -free), np.append(upper, free),
+            0, none, none, np.zeros(0),
         )  # fmt: skip
         self._solver.changeObjectiveSense(highspy.ObjSense.kMaximize)
-        starts = [len(block) // ADDED or 1 for block in blocks]
-        self._add(
-            np.concatenate(
-                [np.flatnonzero(self._test == number)[::step] for number, step in enumerate(starts)]
-            )
-            if blocks
-            else self._added
-        )
 
     @property
     def is_symmetric(self) -> bool:
         return bool(np.allclose(self.lower, -self.upper))
 
     def maximise(self, cost: Array) -> Vertex:
+        """Find the vertex with the largest cost · machine; raise InfeasibleError without any."""
         count, width = len(cost), self._rows.shape[1]
         padded = np.append(cost, np.zeros(width - count))
         self._solver.changeColsCost(width, np.arange(width, dtype=np.int32), padded)
         while True:
             self._solver.run()
-            status = self._solver.getModelStatus()
-            if status == highspy.HighsModelStatus.kInfeasible:
+            if self._solver.getModelStatus() != highspy.HighsModelStatus.kOptimal:
                 raise InfeasibleError("no machine within the tolerances passes all tests")
             solution = self._solver.getSolution()
-            values = np.array(solution.col_value)
-            excess = np.abs(self._rows @ values) / self._sizes - 1.0
+            point = np.array(solution.col_value)
+            excess = np.abs(self._rows @ point) - 1.0
+            excess[self._added] = 0.0
             if excess.max(initial=0.0) <= FEASIBLE:
                 break
-            self._add(self._violated(excess))
+            self._add_violated(excess)
         dual = np.array(solution.row_dual)
         gradient = dual @ self._rows[self._added, :count]
-        offset = float(np.abs(dual) @ self._sizes[self._added])
-        return Vertex(values[:count], float(cost @ values[:count]), gradient, offset)
+        return Vertex(point[:count], float(cost @ point[:count]), gradient, np.abs(dual).sum())
 
-    def bound(self, cost: Array, proofs: Sequence[Vertex]) -> float:
-        """Return an upper bound of a functional, [V], from the proofs of others."""
-        rest = cost - np.array([proof.gradient for proof in proofs])
+    def bounds(self, costs: Array, proofs: Sequence[Vertex] = ()) -> Array:
+        """Compute upper bounds of functionals, [..., V], from the box and proofs of others."""
         middle, half = (self.upper + self.lower) / 2.0, (self.upper - self.lower) / 2.0
-        bounds = [proof.offset for proof in proofs] + rest @ middle + np.abs(rest) @ half
-        return float(bounds.min())
+        bounds = costs @ middle + np.abs(costs) @ half
+        for proof in proofs:
+            changed = costs - proof.gradient
+            bounds = np.minimum(bounds, proof.offset + changed @ middle + np.abs(changed) @ half)
+        return bounds
 
-    def box_bounds(self, costs: Array) -> Array:
-        """Return the largest values of functionals, [..., V], over the box."""
-        middle, half = (self.upper + self.lower) / 2.0, (self.upper - self.lower) / 2.0
-        return costs @ middle + np.abs(costs) @ half
-
-    def _violated(self, excess: Array) -> NDArray[np.intp]:
-        rows: list[NDArray[np.intp]] = []
-        for number in np.unique(self._test[excess > FEASIBLE]):
-            candidates = np.flatnonzero((self._test == number) & (excess > FEASIBLE))
-            order = np.argsort(-excess[candidates])
-            rows.append(candidates[order[:ADDED]])
-        return np.concatenate(rows)
-
-    def _add(self, rows: NDArray[np.intp]) -> None:
-        sizes = self._sizes[rows]
-        block = self._rows[rows]
-        index, column = np.nonzero(block)
-        starts = np.searchsorted(index, np.arange(len(rows))).astype(np.int32)
+    def _add_violated(self, excess: Array) -> None:
+        """Add the rows of each test that exceed its limit most."""
+        order = np.argsort(-excess)
+        order = order[excess[order] > FEASIBLE]
+        tests = self._test[order]
+        chosen = np.concatenate([order[tests == test][:ADDED] for test in np.unique(tests)])
+        block = self._rows[chosen]
+        row, column = np.nonzero(block)
+        starts = np.searchsorted(row, np.arange(len(chosen))).astype(np.int32)
+        ones, columns = np.ones(len(chosen)), column.astype(np.int32)
         self._solver.addRows(
-            len(rows),
-            -sizes,
-            sizes,
-            len(index),
-            starts,
-            column.astype(np.int32),
-            block[index, column],
+            len(chosen), -ones, ones, len(row), starts, columns, block[row, column]
         )
-        self._added = np.append(self._added, rows)
+        self._added = np.append(self._added, chosen)
 
 
 @cache
@@ -195,11 +170,11 @@ class LargestError:
     low_um: float  # that of the machine
     high_um: float
     node: int
-    values: Array  # [V], µm or µrad; errors of the machine
+    machine: Array  # [V], µm or µrad; errors at their knots
     error_um: Array  # [3]; its error vector at the node
 
 
-class _Search:
+class _LargestErrorSearch:
     def __init__(self, polytope: Polytope, gains: Array, gap: float, limit_um: float) -> None:
         self.polytope, self.gains, self.gap = polytope, gains, gap
         self.limit_um = 0.0 if np.isinf(limit_um) else limit_um
@@ -215,12 +190,12 @@ class _Search:
         while True:
             vertex = self.polytope.maximise(cost)
             first = first or vertex
-            errors = self.gains @ vertex.values
+            errors = self.gains @ vertex.point
             norm = np.linalg.norm(errors, axis=1)
             at = int(np.argmax(norm))
             if norm[at] <= self.best.low_um * (1.0 + 1e-4):
                 return first
-            self.best = LargestError(float(norm[at]), 0.0, at, vertex.values, errors[at])
+            self.best = LargestError(float(norm[at]), 0.0, at, vertex.point, errors[at])
             cost = errors[at] @ self.gains[at] / norm[at]
 
     def close(self, node: int, check_cancelled: Callable[[], None]) -> float:
@@ -228,25 +203,25 @@ class _Search:
         triangles, is_symmetric = icosahedron(), self.polytope.is_symmetric
         if is_symmetric:
             triangles = triangles[triangles.sum(axis=1) @ SIDE > 0.0]
-        proofs = [Vertex(np.zeros(0), 0.0, np.zeros(self.gains.shape[2]), 0.0)]
+        proofs: list[Vertex] = []
         upper, solved = dict[bytes, float](), set[bytes]()  # by direction
 
         def key_of(corner: Array) -> bytes:
             sign = np.sign(corner @ SIDE) if is_symmetric else 1.0
             return (np.round(sign * corner, 9) + 0.0).tobytes()
 
-        def entry(triangle: Array) -> tuple[float, int, Array]:
+        def ranked(triangle: Array) -> tuple[float, int, Array]:
             for corner in triangle:
                 key = key_of(corner)
                 if key not in solved:
                     cost = np.frombuffer(key) @ self.gains[node]
-                    bound = self.polytope.bound(cost, proofs)
+                    bound = float(self.polytope.bounds(cost, proofs))
                     upper[key] = min(upper.get(key, np.inf), bound)
             heights = np.array([upper[key_of(corner)] for corner in triangle])
             return -cone_bound(triangle, heights), next(number), triangle
 
         number = count()
-        queue = [entry(triangle) for triangle in triangles]
+        queue = [ranked(triangle) for triangle in triangles]
         heapify(queue)
         while -queue[0][0] > self.threshold_um:
             triangle = heappop(queue)[2]
@@ -258,7 +233,7 @@ class _Search:
                 upper[key] = proofs[-1].maximum
                 solved.add(key)
                 check_cancelled()
-                heappush(queue, entry(triangle))
+                heappush(queue, ranked(triangle))
                 continue
             sums = triangle + np.roll(triangle, -1, axis=0)
             lengths = np.linalg.norm(sums, axis=1)
@@ -268,7 +243,7 @@ class _Search:
                 key = key_of(corner)
                 upper[key] = min(upper.get(key, np.inf), height)
             for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)):
-                heappush(queue, entry(np.array(part)))
+                heappush(queue, ranked(np.array(part)))
         return -queue[0][0]
 
 
@@ -300,9 +275,9 @@ def find_largest_error(
     direction becomes that of its error vector. Nodes, and corners of triangles, whose bound by
     tolerances alone is small enough are not solved.
     """
-    search, high = _Search(polytope, gains, gap, limit_um), 0.0
+    search, high = _LargestErrorSearch(polytope, gains, gap, limit_um), 0.0
     triangles = icosahedron()
-    heights = np.stack([polytope.box_bounds(triangles @ each) for each in gains])
+    heights = np.stack([polytope.bounds(triangles @ each) for each in gains])
     bounds = np.array(
         [max(cone_bound(t, h) for t, h in zip(triangles, each, strict=True)) for each in heights]
     )

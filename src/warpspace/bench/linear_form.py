@@ -21,10 +21,10 @@ class LinearForm:
     factor: float = 1.0  # 2 for widths
 
 
-def absolute(rows: Array, *more: Array) -> LinearForm:
-    """Return the form of the largest absolute value of rows, [n, ...] each."""
-    stacked = np.concatenate([rows, *more]) if more else rows
-    return LinearForm(stacked, np.zeros((len(stacked), 0)))
+def absolute(*parts: Array) -> LinearForm:
+    """Return the form of the largest absolute value of rows, parts of [n, ...] each."""
+    rows = np.concatenate(parts)
+    return LinearForm(rows, np.zeros((len(rows), 0)))
 
 
 def zone(rows: Array, *columns: Array) -> LinearForm:
