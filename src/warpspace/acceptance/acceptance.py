@@ -23,7 +23,7 @@ from warpspace.units import Array
 
 KNOTS = (2, 21)
 MAX_NEXT = 10
-FACTOR_STEPS = 9  # that halve the interval of a factor
+FACTOR_STEPS = 7  # that halve the interval of a factor
 MAX_SLOPE = 1e6
 MIN_CONTRIBUTION = 0.01  # share of |E| of an error that the table lists
 
@@ -154,7 +154,6 @@ class AcceptanceResult(Result):
             ],
             title="Errors responsible",
         )
-
         if self.keep_um is not None and self.factor is None:
             yield f"  no limits of these tests keep |E| ≤ {self.keep_um:g} µm everywhere"
         elif self.keep_um is not None:
@@ -189,7 +188,7 @@ def find_worst_machine(
     ----------
     scene : Scene
     tests : sequence of PlannedTest
-        None for the machines within tolerance.
+        Empty for all machines within tolerance.
     request : Acceptance, optional
         Knots and slope.
     watch : callable, optional

@@ -22,6 +22,7 @@ from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.scene.model import Scene
 
 VARIED = ("plane", "axis", "across", "kind")  # options of tests, and their place
+MAX_READINGS = 5_000  # of one test
 COARSE_GAP = 0.2  # of the bounds that candidates are ranked by
 
 
@@ -43,6 +44,8 @@ def build_constraint(
     watch(0.0)
     try:
         plan = planned.test.plan(curves.scene)
+        if plan.readings > MAX_READINGS:
+            raise OptionError(f"{plan.readings:,} readings; expected at most {MAX_READINGS:,}")
         forms = planned.test.linear_forms(plan, curves.readings(plan))
     except WarpspaceError as error:
         raise OptionError(f"{planned.name}: {error}") from error

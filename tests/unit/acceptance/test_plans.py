@@ -95,6 +95,7 @@ def test_unknown_bundled_plan(scene):
         ({"test": "rotary-axis", "axis": "A", "limit_um": 8}, "unknown axis 'A'"),
         ({"test": "positioning", "limit_um": 8, "quantity": "R_um"}, "R_um has no linear form"),
         ({"test": "r-test", "limit_um": 8, "quantity": "rms_fitted_um"}, "has no linear form"),
+        ({"test": "circular", "limit_um": 8, "points": 100_000}, "200,000 readings; expected"),
         ({"test": "circular", "limit_urad": 8}, "limit_urad; .* expects limit_um"),
     ],
 )
