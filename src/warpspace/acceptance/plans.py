@@ -31,7 +31,7 @@ class PlannedTest:
     @property
     def name(self) -> str:
         """Name of the test and its options, for lists."""
-        return " ".join([self.test.name, *map(str, self.options.values())])
+        return " ".join([self.test.name, *map(_text, self.options.values())])
 
 
 def plan_names() -> tuple[str, ...]:
@@ -110,5 +110,7 @@ def _positive(raw: object, name: str, largest: float) -> float:
 def _text(raw: Any) -> str:
     """Spell a value of TOML as on the command line."""
     if isinstance(raw, Mapping):
-        return ",".join(f"{key}={raw[key]}" for key in cast("Mapping[str, object]", raw))
-    return ",".join(map(str, raw)) if isinstance(raw, list) else str(raw)
+        pairs = cast("Mapping[str, Any]", raw).items()
+        return ",".join(f"{key}={_text(part)}" for key, part in pairs)
+    parts = cast("list[Any]", raw) if isinstance(raw, list) else [raw]
+    return ",".join(str(part).removesuffix(".0") for part in parts)

@@ -46,12 +46,13 @@ def test_default_plan_follows_the_axes():
 def test_options_are_those_of_the_bench(scene):
     (test,) = plan(
         scene,
-        entry(test="circular", plane="YZ", radius_mm=50, limit_um=8, minutes=15)
-        + "\nat = { X = 20 }",
+        entry(test="circular", plane="YZ", radius_mm=50.25, limit_um=8, minutes=15)
+        + "\nat = { X = 20.0 }",
     )
-    assert test.test.plane == "YZ"
+    assert (test.test.plane, test.test.radius_mm) == ("YZ", 50.25)
     assert dict(test.test.at) == {"X": 20.0}
     assert (test.limit, test.unit, test.minutes) == (8.0, "um", 15.0)
+    assert test.name == "circular YZ 50.25 X=20"
 
 
 @pytest.mark.parametrize(
