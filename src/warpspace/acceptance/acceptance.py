@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from warpspace.acceptance.plans import UNITS, PlannedTest, default_plan, load_pl
 from warpspace.acceptance.polytope import Constraint, InfeasibleError, LargestError
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import NO_JSON, Analysis, Change, ProgressCallback, Result
-from warpspace.analysis.options import File, option, place_words
+from warpspace.analysis.options import Grammar, option, place_words, typed_word
 from warpspace.bench.base import run_test
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import compare_orders, evaluate_field
@@ -26,6 +26,7 @@ MAX_NEXT = 10
 FACTOR_STEPS = 7  # that halve the interval of a factor
 MAX_SLOPE = 1e6
 MIN_CONTRIBUTION = 0.01  # share of |E| of an error that the table lists
+Plan: TypeAlias = Annotated[str | None, Grammar("PLAN", typed_word, is_file=True)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,10 +35,11 @@ class Acceptance(Analysis):
 
     Considers all machines within the tolerances of SCENE: each error is an arbitrary curve, linear
     between its knots. PLAN lists tests of the bench with limits ([[acceptance]] test = "circular",
-    plane = "XY", radius_mm = 100, limit_um = 8, minutes = 15). Reports the largest |E| in the
-    volume over all machines that pass, between two bounds that differ by 2 % at most; the machine
-    that has it; and the largest |E| without tests. First order; the machine is evaluated with the
-    exact chain as well. Reversal and scatter of repeated runs are not considered.
+    plane = "XY", radius_mm = 100, limit_um = 8, minutes = 15); by default a bundled one for the
+    axes of the machine. Reports the largest |E| in the volume over all machines that pass, between
+    two bounds that differ by 2 % at most; the machine that has it; and the largest |E| without
+    tests. First order; the machine is evaluated with the exact chain as well. Reversal and scatter
+    of repeated runs are not considered.
     """
 
     name = "acceptance"
@@ -46,7 +48,7 @@ class Acceptance(Analysis):
     makes_scenes = True
     scene_help = "Write SCENE with the errors of the worst machine that passes"
     has_table = True
-    plan: File = option(
+    plan: Plan = option(
         None,
         f"Plan of tests, TOML, or a bundled one: {', '.join(plan_names())}",
         positional=True,
@@ -133,7 +135,13 @@ class AcceptanceResult(Result):
                 Column("unit", key="unit"),
             ),
             [
-                (test.name, test.value, test.limit, test.limit - test.value, test.unit)
+                (
+                    test.name,
+                    test.value,
+                    test.limit,
+                    round(test.limit - test.value, 6) + 0.0,
+                    test.unit,
+                )
                 for test in self.tests
             ],
             title="Tests of the worst machine",
@@ -248,10 +256,10 @@ def find_factor(
         except InfeasibleError:
             low = middle
             continue
-        if largest.low_um > limit_um:
-            high = middle
-        else:
+        if largest.high_um <= limit_um:
             low = factor = middle
+        else:
+            high = middle
     return factor
 
 

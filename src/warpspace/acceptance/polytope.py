@@ -17,6 +17,7 @@ from warpspace.units import Array
 FEASIBLE = 1e-7  # share of a limit by which rows may exceed it
 ADDED = 8  # rows of one test that are added to the program at a time
 GAP = 0.02  # of upper and lower bound
+CLOSE = 0.999  # share of a limit that counts as reached
 SIDE = np.array([1.0, 1e-3, 1e-6])  # of two opposite directions, the one on it is solved
 MAX_ROWS = 60_000  # functionals of all tests
 
@@ -177,12 +178,14 @@ class LargestError:
 class _LargestErrorSearch:
     def __init__(self, polytope: Polytope, gains: Array, gap: float, limit_um: float) -> None:
         self.polytope, self.gains, self.gap = polytope, gains, gap
-        self.limit_um = 0.0 if np.isinf(limit_um) else limit_um
+        self.limit_um = limit_um
         self.best = LargestError(0.0, 0.0, 0, np.zeros(gains.shape[2]), np.zeros(3))
 
     @property
     def threshold_um(self) -> float:
-        return max((1.0 + self.gap) * self.best.low_um, self.limit_um)
+        if np.isinf(self.limit_um):
+            return (1.0 + self.gap) * self.best.low_um
+        return np.inf if self.best.low_um > CLOSE * self.limit_um else self.limit_um
 
     def maximise(self, node: int, direction: Array) -> Vertex:
         """Maximise one direction at a node; improve the best machine, its direction iterated."""
@@ -264,7 +267,8 @@ def find_largest_error(
         Called with the completed share of the work.
     gap : float, optional
     limit_um : float, optional
-        Limit to be decided upon: the bounds are as close as it takes to be on one side of it.
+        Limit to be decided upon: the upper bound is at most the limit, or infinite where a machine
+        exceeds `CLOSE` of it.
 
     Notes
     -----
@@ -283,9 +287,9 @@ def find_largest_error(
     )
     for done, node in enumerate(np.argsort(-bounds)):
         if bounds[node] <= max(search.threshold_um, high):
-            high = max(high, bounds[node])
             break
         high = max(high, search.close(int(node), partial(watch, done / len(bounds))))
-        if search.best.low_um > limit_um:
-            break
-    return replace(search.best, high_um=max(high, search.best.low_um))
+    if np.isinf(search.threshold_um):
+        return replace(search.best, high_um=np.inf)
+    left = bounds[bounds <= max(search.threshold_um, high)].max(initial=0.0)
+    return replace(search.best, high_um=float(max(high, left, search.best.low_um)))
