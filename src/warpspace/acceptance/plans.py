@@ -46,7 +46,9 @@ def default_plan(scene: Scene) -> str:
 
 
 def load_plan(name: str, scene: Scene) -> tuple[PlannedTest, ...]:
-    """Read a plan, a file or a bundled one by name; raise SceneError with all its problems."""
+    """Read a plan: a file, a bundled one by name, or the text of one; raise SceneError."""
+    if "\n" in name:
+        return parse_plan(name, "plan", scene)
     path = Path(name)
     if path.suffix != ".toml":
         if name not in plan_names():
