@@ -291,5 +291,5 @@ def find_largest_error(
         high = max(high, search.close(int(node), partial(watch, done / len(bounds))))
     if np.isinf(search.threshold_um):
         return replace(search.best, high_um=np.inf)
-    left = bounds[bounds <= max(search.threshold_um, high)].max(initial=0.0)
-    return replace(search.best, high_um=float(max(high, left, search.best.low_um)))
+    remaining = bounds[bounds <= max(search.threshold_um, high)].max(initial=0.0)
+    return replace(search.best, high_um=float(max(high, remaining, search.best.low_um)))
