@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 
 from warpspace.acceptance.polytope import (
-    GAP,
     Constraint,
     LargestError,
     Polytope,
@@ -150,13 +149,9 @@ class ErrorCurves:
         return Polytope(self.lower, self.upper, [*slopes, *constraints])
 
     def find_largest(
-        self,
-        constraints: Sequence[Constraint],
-        watch: ProgressCallback,
-        gap: float = GAP,
-        limit_um: float = np.inf,
+        self, constraints: Sequence[Constraint], watch: ProgressCallback, limit_um: float = np.inf
     ) -> LargestError:
-        return find_largest_error(self.polytope(constraints), self.gains, watch, gap, limit_um)
+        return find_largest_error(self.polytope(constraints), self.gains, watch, limit_um)
 
     def _slope_limit(self, slope: float) -> Constraint:
         rows = [np.zeros((0, len(self.variables)))]
