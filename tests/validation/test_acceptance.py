@@ -37,9 +37,9 @@ LINES += [
 DIAGONALS = ['test = "diagonals"\nlimit_um = 12']
 
 
-def scene_of(tmp_path, tolerances=TOLERANCES):
+def scene_of(tmp_path, tolerances=TOLERANCES, chain="wFXYZt"):
     path = tmp_path / "scene.toml"
-    path.write_text(SCENE + tolerances, encoding="utf-8")
+    path.write_text(SCENE.replace("wFXYZt", chain) + tolerances, encoding="utf-8")
     return load_scene(str(path))
 
 
@@ -303,6 +303,18 @@ def test_dense_volume_has_no_larger_error_than_the_knots(tmp_path):
         nodes = np.linalg.norm(curves.gains @ values, axis=-1).max()
         dense = warpspace.evaluate(machine, grid=33).norm_um.max()
         assert dense == pytest.approx(nodes, rel=1e-9)
+
+
+def test_volume_of_a_table_that_carries_the_workpiece(tmp_path):
+    """Lever arms change with the positions of X and Y: between nodes |E| is 1 % larger at most."""
+    scene = scene_of(tmp_path, chain="wYXFZt")
+    curves = ErrorCurves(scene, KNOTS)
+    assert curves.curved_axes == ("X", "Y")
+    rng = np.random.default_rng(5)
+    for machine in rng.uniform(curves.lower, curves.upper, (5, len(curves.lower))):
+        nodes = np.linalg.norm(curves.gains @ machine, axis=-1).max()
+        dense = warpspace.evaluate(curves.build_scene(machine), grid=33).norm_um.max()
+        assert nodes * (1.0 - 1e-9) <= dense <= 1.01 * nodes
 
 
 def test_slope_limits_the_machines(tmp_path):

@@ -179,9 +179,10 @@ class AcceptanceResult(Result):
 
     def caveats(self) -> Iterator[str]:
         yield from super().caveats()
-        rotary = [axis for axis in self.scene.workspace.volume_axes if axis[:1] in ("A", "B", "C")]
-        if rotary:
-            yield f"the volume is evaluated at the knots of {', '.join(rotary)} only"
+        axes = ErrorCurves(self.scene, self.knots).curved_axes
+        if axes:
+            count = 2 * self.knots - 1
+            yield f"|E| is evaluated at {count} positions only along {', '.join(axes)}"
 
 
 def find_worst_machine(

@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 
 from warpspace.acceptance.polytope import (
-    GAP,
     Constraint,
     LargestError,
     Polytope,
@@ -35,12 +34,13 @@ class ErrorCurves:
 
     Notes
     -----
-    The largest |E| over a volume of linear axes is at a node whose positions are knots. The
-    response to a rotation is its lever arm, which does not depend on the axis of the error but is
-    linear in the position of each other axis. Between two knots of an axis, the others at rest, E
-    is therefore linear in its position and |E| convex, so that one of the knots has the larger |E|;
-    axis after axis, this leads to a node. A rotary axis turns lever arms: where one spans the
-    volume, the maximum is that of the nodes.
+    Over a volume of linear axes that carry the tool, the largest |E| is at a node whose positions
+    are knots. The response to a rotation is its lever arm, from the carriage of its axis to the
+    tool, which is linear in the positions of the axes beyond and independent of that of its own.
+    Between two knots of an axis, the others at rest, E is therefore linear in its position and |E|
+    convex, so that one of the knots has the larger |E|; axis after axis, this leads to a node. The
+    lever arm of an axis that carries the workpiece changes with its own position, and a rotary axis
+    turns lever arms: along these (`curved_axes`) nodes are the knots and the positions midway.
     """
 
     scene: Scene
@@ -84,8 +84,19 @@ class ErrorCurves:
 
     @cached_property
     def grid(self) -> Grid:
-        """Nodes of the volume: the knots along each axis."""
-        return build_grid(self.scene.model, self.scene.workspace, self.knots)
+        """Nodes of the volume: the knots along each axis, and positions midway."""
+        nodes = [
+            2 * self.knots - 1 if axis in self.curved_axes else self.knots
+            for axis in self.scene.workspace.volume_axes
+        ]
+        return build_grid(self.scene.model, self.scene.workspace, nodes)
+
+    @property
+    def curved_axes(self) -> tuple[str, ...]:
+        """Axes of the volume between whose knots |E| may be larger than at both."""
+        carrying = self.scene.machine.chain.workpiece
+        axes = filter(None, self.scene.workspace.volume_axes)
+        return tuple(axis for axis in axes if axis in carrying or not is_linear(axis))
 
     @cached_property
     def gains(self) -> Array:
@@ -138,13 +149,9 @@ class ErrorCurves:
         return Polytope(self.lower, self.upper, [*slopes, *constraints])
 
     def find_largest(
-        self,
-        constraints: Sequence[Constraint],
-        watch: ProgressCallback,
-        gap: float = GAP,
-        limit_um: float = np.inf,
+        self, constraints: Sequence[Constraint], watch: ProgressCallback, limit_um: float = np.inf
     ) -> LargestError:
-        return find_largest_error(self.polytope(constraints), self.gains, watch, gap, limit_um)
+        return find_largest_error(self.polytope(constraints), self.gains, watch, limit_um)
 
     def _slope_limit(self, slope: float) -> Constraint:
         rows = [np.zeros((0, len(self.variables)))]

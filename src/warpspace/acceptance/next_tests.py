@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -23,7 +24,7 @@ from warpspace.scene.model import Scene
 
 VARIED = ("plane", "axis", "across", "kind")  # options of tests, and their place
 MAX_READINGS = 5_000  # of one test
-COARSE_GAP = 0.2  # of the bounds that candidates are ranked by
+NEEDED = 0.99  # share of the largest |E| that a further test leaves at most
 
 
 @dataclass(frozen=True)
@@ -71,8 +72,8 @@ def find_next_tests(
 ) -> Iterator[NextTest]:
     """Add tests one by one, until the bound is below the limit of the scene.
 
-    Only a test that the worst machine fails can reduce the bound. Its reduction is estimated with a
-    coarse search; the bound of the best one is that of the fine search.
+    Only a test that the worst machine fails can reduce the bound. Most others are excluded as soon
+    as a machine that passes them exceeds what is left by the best test so far.
     """
     untimed = [planned.name for planned in tests if planned.minutes is None]
     if untimed:
@@ -80,22 +81,30 @@ def find_next_tests(
     candidates = list(_candidates(curves, tests, watch))
     present, limit_um = list(constraints), curves.scene.limit_um or 0.0
     for step in range(count):
-        ranking: list[tuple[float, int]] = []
+        rate, best = 0.0, None  # µm per minute
         for number, (planned, constraint) in enumerate(candidates):
-            share = (step + number / len(candidates)) / count
-            watch(0.6 + 0.4 * share)
-            if passes(worst, constraint):
+            share = 0.6 + 0.4 * (step + number / len(candidates)) / count
+            watch(share)
+            minutes = planned.minutes or 1.0
+            target_um = min(NEEDED * worst.low_um, worst.low_um - rate * minutes)
+            if target_um <= 0.0 or passes(worst, constraint):
                 continue
-            coarse = curves.find_largest([*present, constraint], lambda _: watch(0.6), COARSE_GAP)
-            reduction = worst.low_um - coarse.low_um
-            ranking.append((reduction / (planned.minutes or 1.0), number))
-        if not ranking or worst.high_um <= limit_um:
+            tick = partial(_keep_share, watch, share)
+            extended = [*present, constraint]
+            if curves.find_largest(extended, tick, limit_um=target_um).high_um <= target_um:
+                largest = curves.find_largest(extended, tick)
+                rate, best = (worst.low_um - largest.low_um) / minutes, (number, largest)
+        if best is None or worst.high_um <= limit_um:
             return
-        planned, constraint = candidates.pop(max(ranking)[1])
+        number, worst = best
+        planned, constraint = candidates.pop(number)
         present.append(constraint)
-        worst = curves.find_largest(present, lambda _: watch(0.6))
         name, minutes = planned.test.name, planned.minutes or 1.0
         yield NextTest(name, planned.options, worst.high_um, minutes, planned.name)
+
+
+def _keep_share(watch: ProgressCallback, share: float, _part: float) -> None:
+    watch(share)
 
 
 def passes(worst: LargestError, constraint: Constraint) -> bool:

@@ -176,15 +176,14 @@ class LargestError:
 
 
 class _LargestErrorSearch:
-    def __init__(self, polytope: Polytope, gains: Array, gap: float, limit_um: float) -> None:
-        self.polytope, self.gains, self.gap = polytope, gains, gap
-        self.limit_um = limit_um
+    def __init__(self, polytope: Polytope, gains: Array, limit_um: float) -> None:
+        self.polytope, self.gains, self.limit_um = polytope, gains, limit_um
         self.best = LargestError(0.0, 0.0, 0, np.zeros(gains.shape[2]), np.zeros(3))
 
     @property
     def threshold_um(self) -> float:
         if np.isinf(self.limit_um):
-            return (1.0 + self.gap) * self.best.low_um
+            return (1.0 + GAP) * self.best.low_um
         return np.inf if self.best.low_um > CLOSE * self.limit_um else self.limit_um
 
     def maximise(self, node: int, direction: Array) -> Vertex:
@@ -254,10 +253,9 @@ def find_largest_error(
     polytope: Polytope,
     gains: Array,
     watch: Callable[[float], None],
-    gap: float = GAP,
     limit_um: float = np.inf,
 ) -> LargestError:
-    """Find the largest |E| over nodes and machines, with bounds that differ by at most `gap`.
+    """Find the largest |E| over nodes and machines, with bounds that differ by at most `GAP`.
 
     Parameters
     ----------
@@ -265,7 +263,6 @@ def find_largest_error(
         Response of each node to each value.
     watch : callable
         Called with the completed share of the work.
-    gap : float, optional
     limit_um : float, optional
         Limit to be decided upon: the upper bound is at most the limit, or infinite where a machine
         exceeds `CLOSE` of it.
@@ -279,7 +276,7 @@ def find_largest_error(
     direction becomes that of its error vector. Nodes, and corners of triangles, whose bound by
     tolerances alone is small enough are not solved.
     """
-    search, high = _LargestErrorSearch(polytope, gains, gap, limit_um), 0.0
+    search, high = _LargestErrorSearch(polytope, gains, limit_um), 0.0
     triangles = icosahedron()
     heights = np.stack([polytope.bounds(triangles @ each) for each in gains])
     bounds = np.array(
@@ -291,5 +288,5 @@ def find_largest_error(
         high = max(high, search.close(int(node), partial(watch, done / len(bounds))))
     if np.isinf(search.threshold_um):
         return replace(search.best, high_um=np.inf)
-    left = bounds[bounds <= max(search.threshold_um, high)].max(initial=0.0)
-    return replace(search.best, high_um=float(max(high, left, search.best.low_um)))
+    remaining = bounds[bounds <= max(search.threshold_um, high)].max(initial=0.0)
+    return replace(search.best, high_um=float(max(high, remaining, search.best.low_um)))

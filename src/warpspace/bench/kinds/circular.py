@@ -114,11 +114,11 @@ def fit_circle_readings(plan: BenchPlan, readings: Array) -> CircleFit:
 
 def fit_centre(plan: BenchPlan, readings: Array, rows: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Fit circle and ellipse to some readings, [m, ...]; return the fit and them centred."""
-    marks, values = plan.marks, readings[rows]
+    marks, radial = plan.marks, readings[rows]
     elliptic = covered_deg(marks["angle_deg"][rows]) >= HALF_DEG - 1e-6
     part = _circle_design(plan)[rows, : 5 if elliptic else 3]
-    fit = np.linalg.pinv(part) @ values
-    return fit, values if "as_read" in marks else values - part[:, 1:3] @ fit[1:3]
+    fit = np.linalg.pinv(part) @ radial
+    return fit, radial if "as_read" in marks else radial - part[:, 1:3] @ fit[1:3]
 
 
 def _circle_design(plan: BenchPlan) -> Array:

@@ -274,8 +274,8 @@ class Diagonals(BenchTest):
         number, position = plan.marks["diagonal"], np.round(plan.marks["position_mm"], 3)
         lengths: list[Array] = []
         for index in range(len(self.names)):
-            at, values = position[number == index], readings[number == index]
-            ends = (values[at == end].mean(axis=0) for end in (at.min(), at.max()))
+            at, along = position[number == index], readings[number == index]
+            ends = (along[at == end].mean(axis=0) for end in (at.min(), at.max()))
             lengths.append(-np.subtract(*ends))
         squareness = squareness_of_diagonals(plan, self.names, np.stack(lengths))
         return {

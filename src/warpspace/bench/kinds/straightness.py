@@ -280,12 +280,12 @@ class Squareness(BenchTest):
         heights: dict[str, LinearForm] = {}
         for index, axis in enumerate(self.plane):
             arm = plan.marks["line"] == index
-            position, values = plan.marks["along_mm"][arm], readings[arm]
-            x, mean = mean_by(position, values)
+            position, deviation = plan.marks["along_mm"][arm], readings[arm]
+            x, mean = mean_by(position, deviation)
             away = x - x.mean()
             end_points.append(1e3 * end_slope(x, mean))
             least_squares.append(1e3 * np.tensordot(away, mean, 1) / (away @ away))
-            heights[f"straightness_{axis}_um"] = line_forms(position, values)["least_squares"]
+            heights[f"straightness_{axis}_um"] = line_forms(position, deviation)["least_squares"]
         slopes = {"least_squares_urad": least_squares, "end_points_urad": end_points}
         angles = {key: absolute(np.add(*each)[None]) for key, each in slopes.items()}
         return {**angles, **heights}
