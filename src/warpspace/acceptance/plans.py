@@ -30,8 +30,14 @@ class PlannedTest:
 
     @property
     def name(self) -> str:
-        """Name of the test and its options, for lists."""
-        return " ".join([self.test.name, *map(_text, self.options.values())])
+        """Name of the test and its options, for lists; counts are omitted."""
+        units = {setting.name: setting.unit for setting in self.test.settings()}
+        words = (
+            f"{_text(value)} {units[key]}".rstrip()
+            for key, value in self.options.items()
+            if units[key] or not isinstance(value, int)
+        )
+        return " ".join([self.test.name, *words])
 
 
 def plan_names() -> tuple[str, ...]:
