@@ -26,6 +26,7 @@ BENCHMARKS = (
     "bench_model",
     "bench_peers",
     "bench_montecarlo",
+    "bench_acceptance",
     "bench_parts",
     "bench_program",
     "bench_start",

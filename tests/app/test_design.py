@@ -1,21 +1,25 @@
 """Improve and Design on the page: repair, tolerances and machines side by side."""
 
 import re
+from base64 import b64encode
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import warpspace
-from app.parts import answer_of, lone_part, section, wait
+from app.parts import LIVE, Alone, answer_of, lone_part, section, wait
 from warpspace import load_scene
 from warpspace.analysis.commands.adjust import Adjust
 from warpspace.analysis.commands.concepts import Concepts, compare_concepts
+from warpspace.analysis.registry import entries
 from warpspace.app.browser import actions as do
 from warpspace.app.documents.output_services import Services
 from warpspace.app.panels import design
 from warpspace.app.panels.improve import AdjustPanel
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import Specification, start_state
+from warpspace.app.state.form_values import linked_forms
 from warpspace.app.state.tree import put
 from warpspace.kinematics.model import Loop
 from warpspace.outputs.report.review import ReportSettings, build_review
@@ -195,3 +199,75 @@ def test_page_report_and_command_have_one_figure_for_one_question():
     forms = {"concepts.loop": "relative", "concepts.own_tolerances": "1"}
     (found,) = answer_of(concepts_part(), replace(asked, forms=forms)).concepts
     assert found.sampled.probability == wanted
+
+
+# --- Acceptance tests -----------------------------------------------------------------------------
+
+PLAN = """[[acceptance]]
+test = "circular"
+plane = "XY"
+radius_mm = 100
+limit_um = {limit}
+"""
+
+
+PAGE = replace(START.page, task="design", open=frozenset({"acceptance"}))
+
+
+def acceptance_panel():
+    (entry,) = (one for one in entries() if one.name == "acceptance")
+    return Alone(design.AcceptancePanel, replace(START, page=PAGE), entry)
+
+
+def uploaded(content):
+    text = b64encode(content).decode()
+    return do.Upload("acceptance", name="plan.toml", size=len(content), content=text)
+
+
+def test_a_plan_can_be_opened_or_chosen_and_the_worst_machine_passes_it():
+    alone = acceptance_panel()
+    part, state = alone.part, alone.do(uploaded(PLAN.format(limit=4).encode()))
+    ran(part, state)
+    result = part.outcome.result
+    (test,) = result.tests
+    assert (test.limit, test.unit) == (4.0, "µm")
+    assert test.value <= 4.0 + 1e-6
+    shown = section(part, state)
+    assert "opened file" in shown
+    assert "[[acceptance]]" not in shown
+    worst = part.handle(state, do.Apply("acceptance", 0))
+    largest = float(LIVE.evaluate(worst).field.norm_um.max())
+    assert largest == pytest.approx(result.bound_um[0], rel=1e-3)
+    chosen = part.handle(state, do.SetOption("acceptance", "plan", "iso_3_axes"))
+    assert part.build_analysis(chosen, {}, chosen.scene).plan == "iso_3_axes"
+    for hostile in (HOSTILE, "file", "/etc/passwd.toml"):
+        assert part.handle(state, do.SetOption("acceptance", "plan", hostile)) is state
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (PLAN.format(limit=-1).encode(), r"plan\.toml.*circular: limit_um: -1; expected above 0"),
+        (b"\xff\xfe", r"plan\.toml"),
+        (b"<script>", r"plan\.toml"),
+    ],
+)
+def test_a_refused_plan_is_named_and_changes_nothing(content, message):
+    alone = acceptance_panel()
+    before = alone.store.state
+    assert alone.do(uploaded(content)).forms == before.forms
+    shown = section(alone.part, before)
+    assert re.search(message, shown, re.DOTALL)
+    assert "<script>" not in shown
+
+
+def test_paths_of_the_tests_are_drawn_while_the_section_is_open():
+    state = replace(START, forms={"acceptance.plan": PLAN.format(limit=4)})
+    path = LIVE.evaluate(replace(state, page=PAGE)).bench
+    ends = path.nominal_mm[path.at.ravel()]
+    radius = np.linalg.norm(ends - ends.mean(axis=0), axis=1)
+    np.testing.assert_allclose(radius, 100.0, rtol=0.01)
+    assert LIVE.evaluate(state).bench is None
+    three = replace(state, page=PAGE, forms={"acceptance.plan": "iso_3_axes"})
+    assert len(np.unique(LIVE.evaluate(three).bench.nominal_mm[:, 2].round(3))) > 10
+    assert not linked_forms(replace(START, forms={"acceptance.plan": "x\n" * 1000}))

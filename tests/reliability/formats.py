@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from warpspace.acceptance.plans import load_plan
 from warpspace.app.documents.transfers import unpack, upload_text
 from warpspace.bench.base import find_test, run_test
 from warpspace.calibration import read_readings
@@ -15,7 +16,7 @@ from warpspace.formats.compensation.compensate import Compensate, compensate
 from warpspace.formats.registry import ReadOptions, find_format, formats, open_upload, read_errors
 from warpspace.formats.to_scene import base_scene, build_imported_scene
 from warpspace.parts.program import Program
-from warpspace.resources import scenes_dir
+from warpspace.resources import assets_dir, scenes_dir
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 
 
@@ -202,6 +203,16 @@ def _read_test(content: bytes, folder: Path) -> object:
     return run_test(load_scene("dvf5000_first"), find_test("positioning")(), path)
 
 
+def _plans() -> list[bytes]:
+    paths = sorted((assets_dir() / "acceptance").glob("*.toml"))
+    at = b'[[acceptance]]\ntest = "r-test"\nball = [9, 0, 9]\nat = { X = 1 }\nlimit_um = 2\n'
+    return [*(path.read_bytes() for path in paths), at]
+
+
+def _read_plan(content: bytes, folder: Path) -> object:
+    return load_plan(str(_put(content, folder, "p.toml")), load_scene("dvf5000_general"))
+
+
 CODES = "0 1 2 3 17 18 19 20 21 28 43 43.4 49 53 54 59 80 81 82 83 90 91 93 94 98 99 41 68.2 999"
 PROGRAM_WORDS = tuple(
     word.encode()
@@ -267,6 +278,7 @@ FORMATS: list[Format] = [
     ),
     Format("readings", _readings, _read_data),
     Format("test", _tests, _read_test),
+    Format("plan", _plans, _read_plan),
 ]
 PROGRAM = Format("program", _programs, _run_program, words=PROGRAM_WORDS, longest_s=12.0)
 EVERY = [*FORMATS, PROGRAM]

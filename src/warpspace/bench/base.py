@@ -1,7 +1,7 @@
 """Base classes of standard tests: options, path, evaluation by the standard, figure."""
 
 from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +16,7 @@ from warpspace.analysis.options import File, Option, Place, option, options_of
 from warpspace.analysis.sampling.distribution import round_width
 from warpspace.analysis.uncertainty.propagation import plus_minus, scene_uncertainty
 from warpspace.bench.data import DataColumn, ReadingsFile, read_table, unit_notes
+from warpspace.bench.linear_form import LinearForm
 from warpspace.bench.plan import BenchPlan, Outcome, fit_setup, respond, simulate
 from warpspace.kinematics.model import Loop, Model, complete_coordinates
 from warpspace.plugins import Registry, load_plugins
@@ -123,6 +124,13 @@ class BenchTest(Analysis):
     @abstractmethod
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         """Evaluate readings, [m], µm or µrad, by the formulas of the standard."""
+
+    def linear_forms(self, plan: BenchPlan, readings: Array) -> Mapping[str, LinearForm]:  # noqa: ARG002 - for subclasses
+        """Build the forms of quantities that are linear in the readings, the usual one first.
+
+        Readings of one run are [m], or responses, [m, V]. 2σ or an RMS have no form.
+        """
+        return {}
 
     @abstractmethod
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:

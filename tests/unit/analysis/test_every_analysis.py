@@ -27,6 +27,7 @@ EVERY = pytest.mark.parametrize("entry", entries(), ids=lambda entry: entry.name
 PARTS = Path(__file__).parents[1] / "parts"
 CONTOUR, PLATE = str(PARTS / "contour.ngc"), str(PARTS / "plate.stl")
 NEEDED = {
+    "acceptance": ("dvf5000_general", {"knots": 2}, ["--knots", "2"]),
     "convert": (
         "dvf5000_first",
         {"wishes": ("component_errors=before_motion",)},

@@ -206,7 +206,7 @@ def _names(picture: LivePicture) -> Iterator[Label]:
     if overlay is not None:
         ends = overlay.drawn_mm(picture.exaggeration)[np.unique(overlay.at)]
         largest = np.linalg.norm(overlay.error_um[np.unique(overlay.at)], axis=-1).max()
-        text = f"{overlay.of.title}: max {_spell(float(largest))}"
+        text = f"{overlay.of}: max {_spell(float(largest))}"
         factor = formatting.spell_factor(picture.exaggeration)
         yield Label(f"{text}, drawn {factor}", ends[np.argmax(ends[:, 2])])
     moved = picture.moved_traces

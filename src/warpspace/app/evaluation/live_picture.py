@@ -17,7 +17,6 @@ from warpspace.app.evaluation.scene_overlays import (
     path_overlay,
 )
 from warpspace.app.state.app_state import AppState
-from warpspace.bench.base import BenchTest
 from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.machine.definition import Vector
 from warpspace.parts.program import ToolPath
@@ -66,7 +65,7 @@ class LivePicture(Picture):
         return picture_size_mm(self.state.scene, self.grid)
 
     @cached_property
-    def bench(self) -> SceneOverlay[type[BenchTest]] | None:
+    def bench(self) -> SceneOverlay[str] | None:
         """The path of the selected standard test; None where there is none, or it cannot be run."""
         return None if self.is_difference else bench_overlay(self.drawn_state)
 

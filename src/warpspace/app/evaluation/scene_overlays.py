@@ -10,6 +10,8 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from warpspace.acceptance.acceptance import Acceptance
+from warpspace.acceptance.plans import default_plan, load_plan
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import TEST, option_values, read_form
@@ -167,24 +169,53 @@ def plan_test(test: BenchTest, scene: Scene) -> BenchPlan:
     return plan
 
 
-def bench_overlay(state: AppState) -> SceneOverlay[type[BenchTest]] | None:
-    """Build the path of the selected test; None where none is drawn, or it cannot be run.
+def planned_tests(state: AppState) -> str | None:
+    """Return the plan of acceptance tests whose paths are drawn, a name or its text; else None."""
+    page, plan = state.page, option_values(state, Acceptance.name).get("plan")
+    is_open = Acceptance.name in page.open and page.task == Acceptance.task
+    return (plan or default_plan(state.scene)) if is_open else None
+
+
+def bench_overlay(state: AppState) -> SceneOverlay[str] | None:
+    """Build the paths of the selected test, or of a plan; None where none can be drawn.
 
     A test is of the uncompensated machine, so that no path is drawn in a compensated box.
     """
+    planned = planned_tests(state)
     kind, option_texts = chosen_test(state), option_values(state, TEST)
-    if kind is None or option_texts.get("path") == "0" or state.controller is not None:
+    if state.controller is not None or (
+        not planned and (kind is None or option_texts.get("path") == "0")
+    ):
         return None
 
-    def lay(scene: Scene) -> SceneOverlay[type[BenchTest]]:
-        plan = plan_test(read_form(kind, kind.settings(), option_texts, scene), scene)
-        at, point = plan.coordinates, plan.point_mm
+    def tests(scene: Scene) -> list[BenchTest]:
+        if planned:
+            return [entry.test for entry in load_plan(planned, scene)]
+        return [] if kind is None else [read_form(kind, kind.settings(), option_texts, scene)]
+
+    def lay(scene: Scene) -> SceneOverlay[str]:
+        plans = [plan_test(test, scene) for test in tests(scene)]
+        point = np.concatenate([plan.point_mm for plan in plans])
+        at = {
+            axis: np.concatenate([plan.coordinates[axis] for plan in plans])
+            for axis in plans[0].coordinates
+        }
         nominal = seen_from_workpiece(scene.model, at, scene.workspace, point)
-        response = respond_sites(scene, plan, scene.parameter_keys).reshape(-1, point.size)
-        pieces = np.concatenate([np.stack([rows[:-1], rows[1:]], 1) for rows in plan.path])
+        keys = scene.parameter_keys
+        responses = [respond_sites(scene, plan, keys).reshape(len(keys), -1) for plan in plans]
+        starts = np.cumsum([0, *(len(plan.point_mm) for plan in plans)])
+        pieces = np.concatenate(
+            [
+                start + np.stack([rows[:-1], rows[1:]], 1)
+                for start, plan in zip(starts, plans, strict=False)
+                for rows in plan.path
+            ]
+        )
         still, inside = np.eye(4), np.zeros(len(point), bool)
+        response = np.concatenate(responses, axis=1)
+        title = "acceptance tests" if planned or kind is None else kind.title
         return SceneOverlay(
-            kind, still, pieces, at, point, inside, still, nominal, response, nominal
+            title, still, pieces, at, point, inside, still, nominal, response, nominal
         )
 
-    return _cached_overlay(state, (kind, *sorted(option_texts.items())), lay)
+    return _cached_overlay(state, (planned or kind, *sorted(option_texts.items())), lay)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from warpspace.acceptance.plans import default_plan, parse_plan, plan_names
 from warpspace.analysis.blocks import Histogram
 from warpspace.analysis.description import Result
 from warpspace.analysis.loop_parameters import loop_keys
@@ -19,6 +20,7 @@ from warpspace.analysis.sampling.worst_case import worst_case_um
 from warpspace.app.browser import actions as do
 from warpspace.app.browser.html import EMPTY, join
 from warpspace.app.browser.templates import Templates
+from warpspace.app.documents.transfers import read_upload, upload_text
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.machine_edits import library
 from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPanel, ResultKey
@@ -26,6 +28,7 @@ from warpspace.app.panels.block_html import histogram_html
 from warpspace.app.panels.panel import alert, on, setting
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.form_values import option_values
 from warpspace.app.state.leaf import Identity
 from warpspace.exceptions import WarpspaceError
 from warpspace.kinematics.model import Loop
@@ -284,3 +287,48 @@ class ConceptsPanel(AnalysisPanel):
             lambda job: draw(scenes, result.analysis, dark, job),
             partial(self.context.save_file, "concepts.png"),
         )
+
+
+# --- Acceptance tests -----------------------------------------------------------------------------
+
+MOST_PLAN_BYTES, PLAN, OWN_PLAN = 100_000, "plan of tests", "file"
+
+
+class AcceptancePanel(AnalysisPanel):
+    """The worst machine that passes its tests; their paths are drawn while the section is open."""
+
+    sentence = "The worst machine within tolerance that still passes its acceptance tests"
+    run_label = "Find the worst machine"
+
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        return {"plan": option_values(state, self.name).get("plan") or None}
+
+    def before_result(self, state: AppState) -> Markup:
+        plan = option_values(state, self.name).get("plan") or default_plan(state.scene)
+        titles = {name: name.replace("_", " ") for name in plan_names()}
+        if plan not in titles:
+            plan, titles = OWN_PLAN, {**titles, OWN_PLAN: "opened file"}
+        return HTML.plan(self.name, titles, plan, MOST_PLAN_BYTES)
+
+    @on(do.SetOption)
+    def set_option(self, state: AppState, action: do.SetOption) -> AppState | None:
+        if action.option == "plan" and action.value in plan_names():
+            return self._with_plan(state, action.value)
+        return super().set_option(state, action)
+
+    @on(do.Upload, later=True)
+    def upload(self, action: do.Upload) -> None:
+        def read() -> str:
+            name, content = read_upload(action, MOST_PLAN_BYTES, PLAN)
+            text = upload_text(content, name, PLAN)
+            parse_plan(text, name, self.context.state.scene)
+            return text
+
+        def accept(text: str) -> None:
+            self.context.post(lambda state: self._with_plan(state, text))
+
+        self.last_key = self.result_key(self.context.state)
+        self._run_job("Reading", lambda _: read(), accept)
+
+    def _with_plan(self, state: AppState, plan: str) -> AppState:
+        return replace(state, forms={**state.forms, f"{self.name}.plan": plan})

@@ -16,7 +16,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels import machine_editor, overlay
 from warpspace.app.panels.analysis_panel import AnalysisPanel
 from warpspace.app.panels.conventions import ConventionsSection
-from warpspace.app.panels.design import ConceptsPanel, TolerancesPanel
+from warpspace.app.panels.design import AcceptancePanel, ConceptsPanel, TolerancesPanel
 from warpspace.app.panels.error_list import ErrorsPanel
 from warpspace.app.panels.explanation import DistancePanel, VolumePanel, WorstPanel
 from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog, accepted_endings
@@ -260,7 +260,7 @@ class PagePanel(Panel):
 PANELS: dict[str, type[AnalysisPanel]] = {
     "calibrate": CalibratePanel, "adjust": AdjustPanel, "compensate": CompensatePanel,
     "allocate": TolerancesPanel, "concepts": ConceptsPanel, "distance": DistancePanel,
-    "part": PartPanel, "program": ProgramPanel,
+    "part": PartPanel, "program": ProgramPanel, "acceptance": AcceptancePanel,
 }  # fmt: skip
 """Panels with features beyond the description of the analysis, by name of the analysis."""
 FIRST = ("compensate", "concepts", "allocate")  # sections at the top of their task

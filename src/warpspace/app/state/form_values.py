@@ -22,7 +22,8 @@ _OPTION = re.compile(r"[a-z_]{1,40}")
 
 
 def linked_forms(state: AppState) -> list[tuple[str, str]]:
-    return [(name, text) for name, text in state.forms.items() if _is_known(name)]
+    forms = state.forms.items()
+    return [(name, text) for name, text in forms if _is_known(name) and len(text) <= LONGEST]
 
 
 def with_form(state: AppState, name: str, text: str) -> AppState:

@@ -1,6 +1,6 @@
 """Ball plate: a grid of balls measured in several positions, as on measuring machines."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,6 +11,7 @@ from warpspace.analysis.options import option
 from warpspace.bench import placing
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import XYZ, DataColumn, ReadingsFile
+from warpspace.bench.linear_form import LinearForm, absolute, largest_range
 from warpspace.bench.plan import BenchPlan, Outcome, build_outcome, build_plan, fit_setup
 from warpspace.exceptions import OptionError
 from warpspace.geometry.surfaces import round_down
@@ -163,6 +164,26 @@ class BallPlate(BenchTest):
             ((name, text, total(name)) for name, text, total in quantities),
             {"positions": rows, "squareness_key": plan.squareness_key},
         )
+
+    def linear_forms(self, plan: BenchPlan, readings: Array) -> Mapping[str, LinearForm]:
+        residual = np.stack(np.split(fit_setup(plan, readings)[1], 3), axis=1)  # [b, 3, ...]
+        count = len(residual)
+        nominal = np.stack([plan.marks[f"seen_{axis}_mm"] for axis in "xyz"], -1)[:count]
+        number, across = (
+            plan.marks["position"][:count],
+            "XYZ".index(({*"XYZ"} - {*self.plane}).pop()),
+        )
+        lengths: list[Array] = []
+        for index in np.unique(number):
+            at, deviation = nominal[number == index], residual[number == index]
+            first, second = np.triu_indices(len(at), 1)
+            apart = at[first] - at[second]
+            apart /= np.linalg.norm(apart, axis=-1, keepdims=True)
+            lengths.append(np.einsum("pc,pc...->p...", apart, deviation[first] - deviation[second]))
+        return {
+            "length_error_um": absolute(*lengths),
+            "flatness_um": largest_range(residual[:, across], number),
+        }
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         columns = ["XYZ".index(name) for name in self.plane]

@@ -12,6 +12,7 @@ from warpspace.analysis.options import Axis, option
 from warpspace.bench import placing
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ANGLE, DIRECTION, DataColumn, ReadingsFile
+from warpspace.bench.linear_form import LinearForm, absolute, zone
 from warpspace.bench.plan import BenchPlan, Outcome, build_outcome, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import Workspace
@@ -89,17 +90,10 @@ def fit_circle_readings(plan: BenchPlan, readings: Array) -> CircleFit:
     least-squares centre, never less than the width of the narrowest ring about the path; which of
     the two ISO 230-4 means is not verified.
     """
-    marks = plan.marks
-    along, up, sense = marks["along"], marks["up"], marks["sense"]
-    design = np.stack([np.ones(len(along)), along, up, along**2 - up**2, 2.0 * along * up], -1)
-    as_read = "as_read" in marks
+    marks, sense = plan.marks, plan.marks["sense"]
 
     def centred(rows: NDArray[np.bool_]) -> tuple[Array, Array]:
-        elliptic = covered_deg(marks["angle_deg"][rows]) >= HALF_DEG - 1e-6
-        part = design[rows, : 5 if elliptic else 3]
-        fit = np.asarray(np.linalg.lstsq(part, readings[rows], rcond=None)[0], dtype=np.float64)
-        values = readings[rows]
-        return fit, values if as_read else values - part[:, 1:3] @ fit[1:3]
+        return fit_centre(plan, readings, rows)
 
     fit, radial = centred(np.ones(len(readings), dtype=bool))
     elliptic = len(fit) == 5
@@ -111,11 +105,36 @@ def fit_circle_readings(plan: BenchPlan, readings: Array) -> CircleFit:
         float(fit[0]),
         float(np.ptp(radial)),
         {sign: float(np.ptp(centred(sense == sign)[1])) for sign in senses},
-        float(np.linalg.lstsq(design[:, :3], readings, rcond=None)[0][0]) if both_senses else None,
+        float(_circle_radius(plan, readings)) if both_senses else None,
         _hysteresis(marks["angle_deg"], sense, radial) if both_senses else None,
         float(fit[4]) if elliptic else None,
         2.0 * float(fit[3]) if elliptic else 0.0,
     )
+
+
+def fit_centre(plan: BenchPlan, readings: Array, rows: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Fit circle and ellipse to some readings, [m, ...]; return the fit and them centred."""
+    marks, radial = plan.marks, readings[rows]
+    elliptic = covered_deg(marks["angle_deg"][rows]) >= HALF_DEG - 1e-6
+    part = _circle_design(plan)[rows, : 5 if elliptic else 3]
+    fit = np.linalg.pinv(part) @ radial
+    return fit, radial if "as_read" in marks else radial - part[:, 1:3] @ fit[1:3]
+
+
+def _circle_design(plan: BenchPlan) -> Array:
+    along, up = plan.marks["along"], plan.marks["up"]
+    return np.stack([np.ones(len(along)), along, up, along**2 - up**2, 2.0 * along * up], -1)
+
+
+def _circle_radius(plan: BenchPlan, readings: Array) -> Array:
+    return np.linalg.lstsq(_circle_design(plan)[:, :3], readings, rcond=None)[0][0]
+
+
+def circle_forms(plan: BenchPlan, readings: Array) -> dict[str, LinearForm]:
+    """Build the forms of circular deviation, radius and the sin 2φ part of a full circle."""
+    fit, radial = fit_centre(plan, readings, np.ones(plan.readings, dtype=bool))
+    forms = {"circular_deviation_um": zone(radial), "radius_um": absolute(fit[:1])}
+    return forms | ({"shear_um": absolute(fit[4:])} if len(fit) == 5 else {})
 
 
 def _hysteresis(angle_deg: Array, sense: Array, radial: Array) -> float:
@@ -294,6 +313,14 @@ class Circular(BenchTest):
             rows.append(("radius_difference_um", label, fit.radius_difference_um))
             details["squareness_key"] = key
         return build_outcome(rows, details | fit.details(plan))
+
+    def linear_forms(self, plan: BenchPlan, readings: Array) -> Mapping[str, LinearForm]:
+        forms = circle_forms(plan, readings)
+        shear = forms.pop("shear_um", None)
+        if shear and not self.rotary:
+            per_shear = 2.0 / (self.radius_mm * UM_PER_MM_URAD)
+            forms["squareness_urad"] = absolute(per_shear * shear.rows)
+        return forms
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []

@@ -10,7 +10,8 @@ from warpspace.analysis.options import Vector, option
 from warpspace.bench import placing
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ANGLE, DataColumn, ReadingsFile
-from warpspace.bench.kinds.circular import fit_circle_readings
+from warpspace.bench.kinds.circular import circle_forms, fit_circle_readings
+from warpspace.bench.linear_form import LinearForm
 from warpspace.bench.plan import BenchPlan, Outcome, build_outcome, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
@@ -168,6 +169,10 @@ class ConeFrustum(BenchTest):
             ("radius_um", "mean radius − nominal", fit.radius_um),
         ]
         return build_outcome(rows, fit.details(plan))
+
+    def linear_forms(self, plan: BenchPlan, readings: Array) -> Mapping[str, LinearForm]:
+        forms = circle_forms(plan, readings)
+        return {key: forms[key] for key in ("circular_deviation_um", "radius_um")}
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []

@@ -1,6 +1,6 @@
 """Diagonal displacement tests: body, face and step diagonals (ISO 230-6)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -11,6 +11,7 @@ from warpspace.analysis.options import option
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ALONG, DataColumn, ReadingsFile
 from warpspace.bench.kinds.positioning import target_statistics
+from warpspace.bench.linear_form import LinearForm, absolute, largest_range, zone
 from warpspace.bench.placing import PLANES, find_plane, following_axes, tool_offset, tool_points
 from warpspace.bench.plan import BenchPlan, IndexArray, Outcome, build_outcome, build_plan
 from warpspace.exceptions import OptionError
@@ -46,8 +47,8 @@ def means_along(position: Array, travel_sign: Array, readings: Array) -> dict[st
 
 def squareness_of_diagonals(
     plan: BenchPlan, names: Sequence[str], lengths: Array
-) -> dict[str, float]:
-    """Fit the squareness errors that explain the lengths of diagonals, µrad.
+) -> dict[str, Array]:
+    """Fit the squareness errors, µrad, that explain the lengths of diagonals, [d, ...], µm.
 
     A squareness of γ between axes of lengths a and b changes a diagonal of length L by ±γ·a·b/L;
     the common part of all diagonals is scale.
@@ -65,7 +66,7 @@ def squareness_of_diagonals(
         faces = np.kron(np.eye(3), np.ones((2, 1)))
         design = np.concatenate([faces, np.stack(columns, -1)], axis=-1)
     solution = np.linalg.lstsq(design, lengths, rcond=None)[0]
-    return dict(zip(keys, solution[-3:].tolist(), strict=True))
+    return dict(zip(keys, solution[-3:], strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -265,8 +266,23 @@ class Diagonals(BenchTest):
         if reversals:
             quantities.append(("B_um", "largest reversal B", max(reversals)))
         for key, value in squareness_of_diagonals(plan, names, lengths).items():
-            quantities.append((f"squareness_{key}_urad", f"equivalent squareness {key}", value))
+            text = f"equivalent squareness {key}"
+            quantities.append((f"squareness_{key}_urad", text, float(value)))
         return build_outcome(quantities, {"diagonals": rows})
+
+    def linear_forms(self, plan: BenchPlan, readings: Array) -> Mapping[str, LinearForm]:
+        number, position = plan.marks["diagonal"], np.round(plan.marks["position_mm"], 3)
+        lengths: list[Array] = []
+        for index in range(len(self.names)):
+            at, along = position[number == index], readings[number == index]
+            ends = (along[at == end].mean(axis=0) for end in (at.min(), at.max()))
+            lengths.append(-np.subtract(*ends))
+        squareness = squareness_of_diagonals(plan, self.names, np.stack(lengths))
+        return {
+            "E_um": largest_range(readings, number),
+            "length_difference_um": zone(np.stack(lengths)),
+            **{f"squareness_{key}_urad": absolute(row[None]) for key, row in squareness.items()},
+        }
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []

@@ -1,6 +1,6 @@
 """Positioning of an axis: accuracy, repeatability and reversal (ISO 230-2)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +9,7 @@ from warpspace.analysis.blocks import Band, Curve, Lines
 from warpspace.analysis.options import Axis, option
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import DataColumn, ReadingsFile
+from warpspace.bench.linear_form import LinearForm, zone
 from warpspace.bench.placing import axis_line, motion_direction, tool_points
 from warpspace.bench.plan import BenchPlan, Outcome, build_outcome, build_plan
 from warpspace.exceptions import OptionError, UnknownNameError
@@ -155,6 +156,9 @@ class Positioning(BenchTest):
         suffix = "um" if unit == "µm" else "urad"
         rows = [(f"{key}_{suffix}", name, size) for key, name, size in _numbers(statistics)]
         return build_outcome(rows, {"targets": _target_rows(statistics, unit)})
+
+    def linear_forms(self, plan: BenchPlan, readings: Array) -> Mapping[str, LinearForm]:
+        return {"E_um" if "zero_um" in plan.setup else "E_urad": zone(readings)}
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []

@@ -1,6 +1,6 @@
 """Tests of a rotary axis: error motions (ISO 230-7) and the R-test (ISO 10791-6)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,6 +12,7 @@ from warpspace.bench import placing
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ANGLE, XYZ, DataColumn, ReadingsFile
 from warpspace.bench.kinds.circular import is_full
+from warpspace.bench.linear_form import LinearForm, absolute, zone
 from warpspace.bench.plan import BenchPlan, Outcome, build_outcome, build_plan, fit_setup
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
@@ -120,13 +121,19 @@ class RotaryAxis(BenchTest):
             ("tilt_urad", "tilt error motion", np.ptp(motions["tilt"])),
             ("angular_urad", "angular positioning", np.ptp(motions["angular"])),
         ]
-        across = {"A": "yz", "B": "zx", "C": "xy"}[axis[0]]
-        parts = [(f"E{x.upper()}0{axis}", "um", f"location in {x}") for x in across]
-        parts += [(f"E{TURNS[x]}0{axis}", "urad", f"orientation about {x}") for x in across]
-        for (key, unit, text), value in zip(parts, average_line, strict=True):
-            rows.append((f"{key}_{unit}", f"{text} ({key})", value))
+        for (key, unit, text), value in zip(_line_parts(axis), average_line, strict=True):
+            rows.append((f"{key}_{unit}", f"{text} ({key})", float(value)))
         details = {f"{name}_motion": values.tolist() for name, values in motions.items()}
         return build_outcome(rows, {"angle_deg": angle_deg.tolist(), **details})
+
+    def linear_forms(self, plan: BenchPlan, readings: Array) -> Mapping[str, LinearForm]:
+        _, motions, average_line = error_motions(plan, readings)
+        units = {"radial": "um", "axial": "um", "tilt": "urad", "angular": "urad"}
+        forms = {f"{name}_{unit}": zone(motions[name]) for name, unit in units.items()}
+        parts = _line_parts(plan.place.partition(" ")[0])
+        for (key, unit, _), value in zip(parts, average_line, strict=True):
+            forms[f"{key}_{unit}"] = absolute(np.asarray(value)[None])
+        return forms
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         axis = runs[0].plan.place.partition(" ")[0]
@@ -147,21 +154,27 @@ class RotaryAxis(BenchTest):
         return tuple(charts)
 
 
-def error_motions(plan: BenchPlan, readings: Array) -> tuple[Array, dict[str, Array], list[float]]:
-    """Compute error motions, [n], µm and µrad, from the readings of six channels, [6 n].
+def _line_parts(axis: str) -> list[tuple[str, str, str]]:
+    across = {"A": "yz", "B": "zx", "C": "xy"}[axis[0]]
+    parts = [(f"E{x.upper()}0{axis}", "um", f"location in {x}") for x in across]
+    return parts + [(f"E{TURNS[x]}0{axis}", "urad", f"orientation about {x}") for x in across]
+
+
+def error_motions(plan: BenchPlan, readings: Array) -> tuple[Array, dict[str, Array], list[Array]]:
+    """Compute error motions, [n, ...], µm and µrad, from the readings of six channels, [6 n, ...].
 
     Positions, [n], ascend. Radial and tilt are taken towards a point that turns with the axis
     (rotating sensitive direction), about the least-squares centre; axial and angular about their
     means, the angular one NaN where it was not measured. Last, the axis average line: location in
     µm along the two directions across the axis, orientation in µrad about them.
     """
-    channels = readings.reshape(6, -1)
+    channels = readings.reshape(6, len(readings) // 6, *readings.shape[1:])
     angle_deg = plan.marks["angle_deg"][: channels.shape[1]]
     order = np.argsort(angle_deg, kind="stable")
     channels, angle_deg = channels[:, order], angle_deg[order]
     theta = np.deg2rad(angle_deg) * plan.marks["direction"][0]
-    cosine, sine = np.cos(theta), np.sin(theta)
-    once = np.stack([np.ones_like(theta), cosine, sine], -1)
+    once = np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], -1)
+    _, cosine, sine = once.T.reshape(3, -1, *[1] * (readings.ndim - 1))
     x, y, z, a, b, c = channels
 
     def once_round(values: Array) -> Array:
@@ -174,12 +187,12 @@ def error_motions(plan: BenchPlan, readings: Array) -> tuple[Array, dict[str, Ar
     leaning = b * cosine - a * sine
     motions = {
         "radial": about_centre(x * cosine + y * sine),
-        "axial": z - z.mean(),
+        "axial": z - z.mean(axis=0),
         "tilt": about_centre(leaning),
-        "angular": c - c.mean(),
+        "angular": c - c.mean(axis=0),
     }
     # means over the turn without the once-per-turn part of an eccentric artefact
-    return angle_deg, motions, [float(once_round(values)[0]) for values in (x, y, a, b)]
+    return angle_deg, motions, [once_round(values)[0] for values in (x, y, a, b)]
 
 
 def _eccentricity(theta: Array) -> dict[str, Array]:
@@ -314,6 +327,15 @@ class RTest(BenchTest):
         }
         details |= {f"{x}_readings_um": raw[at].tolist() for at, x in enumerate("xyz")}
         return build_outcome(rows, details)
+
+    def linear_forms(self, plan: BenchPlan, readings: Array) -> Mapping[str, LinearForm]:
+        residual = fit_setup(plan, readings)[1]
+        forms = {
+            f"{x}_um": zone(part) for x, part in zip("xyz", np.split(readings, 3), strict=True)
+        }
+        for x, part in zip("xyz", np.split(residual, 3), strict=True):
+            forms[f"{x}_fitted_um"] = zone(part)
+        return forms
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []

@@ -11,6 +11,7 @@ from warpspace.analysis.options import Axis, option
 from warpspace.bench import placing
 from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ALONG, DataColumn, ReadingsFile
+from warpspace.bench.linear_form import LinearForm, absolute, project_out, zone
 from warpspace.bench.plan import BenchPlan, Outcome, build_outcome, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.conversion import fit_line
@@ -46,6 +47,28 @@ def fit_lines(position_mm: Array, readings_um: Array) -> tuple[Array, Array, dic
         offset, slope = fit_line(x, mean, name.replace("points", "point"))
         lines[name] = FittedLine(slope * 1e3, offset, float(np.ptp(mean - slope * x)))
     return x, mean, lines
+
+
+def mean_by(position: Array, readings: Array) -> tuple[Array, Array]:
+    """Compute the mean readings, [p, ...], at each position; both ascend."""
+    x, index, count = np.unique(np.round(position, 6), return_inverse=True, return_counts=True)
+    total = np.zeros((len(x), *readings.shape[1:]))
+    np.add.at(total, index.reshape(-1), readings)
+    return x, (total.T / count).T
+
+
+def line_forms(position_mm: Array, readings: Array) -> dict[str, LinearForm]:
+    """Build the forms of the deviation from each reference line."""
+    x, mean = mean_by(position_mm, readings)
+    return {
+        "end_points": zone(mean - np.multiply.outer(x, end_slope(x, mean))),
+        "least_squares": zone(project_out(mean, np.ones(len(x)), x)),
+        "minimum_zone": zone(mean, x),
+    }
+
+
+def end_slope(x: Array, mean: Array) -> Array:
+    return (mean[-1] - mean[0]) / (x[-1] - x[0])
 
 
 def build_line_plan(
@@ -154,6 +177,10 @@ class Straightness(BenchTest):
         ]
         return build_outcome(rows, details)
 
+    def linear_forms(self, plan: BenchPlan, readings: Array) -> Mapping[str, LinearForm]:
+        forms = line_forms(plan.marks["along_mm"], readings)
+        return {f"{name}_um": form for name, form in forms.items()}
+
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
         for run in runs:
@@ -247,6 +274,21 @@ class Squareness(BenchTest):
             height = lines["least_squares"].deviation_um
             rows.append((f"straightness_{axis}_um", f"straightness of {axis}", height))
         return build_outcome(rows, {"squareness_key": key})
+
+    def linear_forms(self, plan: BenchPlan, readings: Array) -> Mapping[str, LinearForm]:
+        end_points, least_squares = [], []
+        heights: dict[str, LinearForm] = {}
+        for index, axis in enumerate(self.plane):
+            arm = plan.marks["line"] == index
+            position, deviation = plan.marks["along_mm"][arm], readings[arm]
+            x, mean = mean_by(position, deviation)
+            away = x - x.mean()
+            end_points.append(1e3 * end_slope(x, mean))
+            least_squares.append(1e3 * np.tensordot(away, mean, 1) / (away @ away))
+            heights[f"straightness_{axis}_um"] = line_forms(position, deviation)["least_squares"]
+        slopes = {"least_squares_urad": least_squares, "end_points_urad": end_points}
+        angles = {key: absolute(np.add(*each)[None]) for key, each in slopes.items()}
+        return {**angles, **heights}
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         charts: list[Lines] = []

@@ -1,0 +1,1 @@
+"""Acceptance tests: the machines that pass them, and the largest error these may have."""

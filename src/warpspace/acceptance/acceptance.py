@@ -1,0 +1,323 @@
+"""Acceptance: the largest error that a machine may have and still pass a plan of tests."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from warpspace.acceptance.error_curves import ErrorCurves
+from warpspace.acceptance.next_tests import NextTest, build_constraint, find_next_tests
+from warpspace.acceptance.plans import UNITS, PlannedTest, default_plan, load_plan, plan_names
+from warpspace.acceptance.polytope import Constraint, InfeasibleError, LargestError
+from warpspace.analysis.blocks import Block, Column, Table, number_columns
+from warpspace.analysis.description import NO_JSON, Analysis, Change, ProgressCallback, Result
+from warpspace.analysis.options import Grammar, option, place_words, typed_word
+from warpspace.bench.base import run_test
+from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import compare_orders, evaluate_field
+from warpspace.machine.axes import parameter
+from warpspace.machine.limits import LIMIT_UM
+from warpspace.scene.model import Scene
+from warpspace.units import Array
+
+KNOTS = (2, 21)
+MAX_NEXT = 10
+FACTOR_STEPS = 7  # that halve the interval of a factor
+MAX_SLOPE = 1e6
+MIN_CONTRIBUTION = 0.01  # share of |E| of an error that the table lists
+Plan: TypeAlias = Annotated[str | None, Grammar("PLAN", typed_word, is_file=True)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Acceptance(Analysis):
+    """Find the largest error of a machine that passes a plan of tests.
+
+    Considers all machines within the tolerances of SCENE: each error is an arbitrary curve, linear
+    between its knots. PLAN lists tests of the bench with limits ([[acceptance]] test = "circular",
+    plane = "XY", radius_mm = 100, limit_um = 8, minutes = 15); by default a bundled one for the
+    axes of the machine. Reports the largest |E| in the volume over all machines that pass, between
+    two bounds that differ by 2 % at most; the machine that has it; and the largest |E| without
+    tests. First order; the machine is evaluated with the exact chain as well. Reversal and scatter
+    of repeated runs are not considered.
+    """
+
+    name = "acceptance"
+    task = "design"
+    doing = "searching"
+    makes_scenes = True
+    scene_help = "Write SCENE with the errors of the worst machine that passes"
+    has_table = True
+    plan: Plan = option(
+        None,
+        f"Plan of tests, TOML, or a bundled one: {', '.join(plan_names())}",
+        positional=True,
+        unset="the bundled one for the axes of the machine",
+    )
+    knots: int = option(5, "Knots of each error along its axis", low=KNOTS[0], high=KNOTS[1])
+    slope: float | None = option(
+        None,
+        "Largest slope of the errors along linear axes, µm/m or µrad/m",
+        low=1e-3,
+        high=MAX_SLOPE,
+        unset="unlimited",
+    )
+    next_count: int | None = option(
+        None,
+        "Find up to N more tests of the kinds of the plan, each the one that reduces the bound most"
+        " per minute, until it is below the limit of SCENE",
+        flag="--next",
+        low=1,
+        high=MAX_NEXT,
+    )
+    keep_um: float | None = option(
+        None,
+        "Find the factor for the limits of the plan with which every machine that passes has"
+        " |E| ≤ LIMIT",
+        unit="µm",
+        low=LIMIT_UM[0],
+        high=LIMIT_UM[1],
+        flag="--keep",
+    )
+
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "AcceptanceResult":
+        tests = load_plan(self.plan or default_plan(scene), scene)
+        return find_worst_machine(scene, tests, self, watch)
+
+
+class TestValue(NamedTuple):
+    """A test of the plan on the worst machine."""
+
+    name: str
+    value: float  # first order
+    limit: float
+    unit: str
+    exact: float  # with the exact chain
+
+
+@dataclass(frozen=True, kw_only=True)
+class AcceptanceResult(Result):
+    """The largest error of a machine that passes, and the machine that has it."""
+
+    scene: Scene = field(metadata=NO_JSON)
+    machine: Scene = field(metadata=NO_JSON)  # the worst one that passes
+    knots: int
+    bound_um: tuple[float, float]  # of the largest |E|: attained, and proved
+    at: Mapping[str, float]  # mm or degrees; where the worst machine has it
+    direction: tuple[float, float, float]  # of its error there
+    without_tests_um: float
+    tests: tuple[TestValue, ...]
+    errors: Mapping[str, float]  # largest value of each error, µm or µrad
+    contributions_um: Mapping[str, float]  # along the direction, the largest first
+    next: tuple[NextTest, ...] = ()  # each added to the tests before it
+    keep_um: float | None = None
+    factor: float | None = None  # for all limits, so that |E| ≤ keep_um; None if there is none
+
+    def json_fields(self) -> dict[str, Any]:
+        document = super().json_fields() | {"tests": [test._asdict() for test in self.tests]}
+        unused = {"next"} if not self.next else set[str]()
+        unused |= {"keep_um", "factor"} if self.keep_um is None else set[str]()
+        return {key: value for key, value in document.items() if key not in unused}
+
+    def changes(self) -> Sequence[Change]:
+        return [Change("worst machine that passes", self.machine)]
+
+    def blocks(self) -> Iterator[Block]:
+        low, high = self.bound_um
+        yield f"{self.scene.title} · {len(self.tests)} tests · {self.knots} knots"
+        yield f"  largest |E| of a machine that passes: {low:.1f} µm (at most {high:.1f} µm)"
+        yield f"  without tests: {self.without_tests_um:.1f} µm"
+        yield f"  at {place_words(self.at)}"
+        yield Table(
+            (
+                Column("test", leads=True, wraps=True, key="test"),
+                *number_columns(("value", "limit", "margin"), keys=("value", "limit", "margin")),
+                Column("unit", key="unit"),
+            ),
+            [
+                (
+                    test.name,
+                    test.value,
+                    test.limit,
+                    round(test.limit - test.value, 6) + 0.0,
+                    test.unit,
+                )
+                for test in self.tests
+            ],
+            title="Tests of the worst machine",
+        )
+        largest = MIN_CONTRIBUTION * low
+        yield Table(
+            (
+                Column("key", leads=True),
+                Column("error", wraps=True),
+                Column("largest value", ".2f"),
+                Column("unit"),
+                Column("contribution", ".2f", "µm"),
+            ),
+            [
+                (key, parameter(key).name, self.errors[key], parameter(key).unit, share)
+                for key, share in self.contributions_um.items()
+                if abs(share) >= largest
+            ],
+            title="Errors responsible",
+        )
+        if self.keep_um is not None and self.factor is None:
+            yield f"  no limits of these tests keep |E| ≤ {self.keep_um:g} µm everywhere"
+        elif self.keep_um is not None:
+            yield f"  |E| ≤ {self.keep_um:g} µm everywhere with {self.factor:.3f} × all limits"
+        if self.next:
+            yield Table(
+                (
+                    Column("test", wraps=True, leads=True),
+                    Column("|E| at most", ".1f", "µm"),
+                    Column("time", "g", "min"),
+                ),
+                [(step.name, step.bound_um, step.minutes) for step in self.next],
+                title="Further tests, each added to those before it",
+            )
+
+    def caveats(self) -> Iterator[str]:
+        yield from super().caveats()
+        axes = ErrorCurves(self.scene, self.knots).curved_axes
+        if axes:
+            count = 2 * self.knots - 1
+            yield f"|E| is evaluated at {count} positions only along {', '.join(axes)}"
+
+
+def find_worst_machine(
+    scene: Scene,
+    tests: Sequence[PlannedTest],
+    request: Acceptance | None = None,
+    watch: ProgressCallback = lambda _share: None,
+) -> AcceptanceResult:
+    """Find the machine within tolerance that passes all tests and has the largest |E|.
+
+    Parameters
+    ----------
+    scene : Scene
+    tests : sequence of PlannedTest
+        Empty for all machines within tolerance.
+    request : Acceptance, optional
+        Knots and slope.
+    watch : callable, optional
+
+    Returns
+    -------
+    AcceptanceResult
+
+    Raises
+    ------
+    OptionError
+        If a tolerance is missing, the machine cannot run a test, or no machine passes.
+    """
+    request = request or Acceptance()
+    curves = ErrorCurves(scene, request.knots, request.slope)
+    constraints = [build_constraint(curves, planned, watch) for planned in tests]
+    plain = not (request.next_count or request.keep_um)
+    without = curves.find_largest((), lambda part: watch(0.1 * part))
+    try:
+        worst = curves.find_largest(
+            constraints, lambda part: watch(0.1 + (0.9 if plain else 0.2) * part)
+        )
+    except InfeasibleError as error:
+        names = _conflict(curves, constraints, watch)
+        verb = "cannot be passed" if len(names) == 1 else "exclude each other"
+        raise OptionError(f"{error}: {', '.join(names)} {verb}") from None
+    report = _report(curves, worst, without.low_um, list(zip(tests, constraints, strict=True)))
+    if request.keep_um is not None:
+        factor = find_factor(curves, constraints, worst, request.keep_um, watch)
+        report = replace(report, keep_um=request.keep_um, factor=factor)
+    if request.next_count:
+        steps = find_next_tests(curves, tests, constraints, worst, request.next_count, watch)
+        report = replace(report, next=tuple(steps))
+    return report
+
+
+def find_factor(
+    curves: ErrorCurves,
+    constraints: Sequence[Constraint],
+    worst: LargestError,
+    limit_um: float,
+    watch: ProgressCallback,
+) -> float | None:
+    """Find the largest factor, at most 1, for all limits with which |E| ≤ limit; None without one.
+
+    The largest |E| grows with the factor, except that there may be no machine below one of them.
+    """
+    if worst.high_um <= limit_um:
+        return 1.0
+    low, high, factor = 0.0, 1.0, None
+    for step in range(FACTOR_STEPS):
+        watch(0.3 + 0.3 * step / FACTOR_STEPS)
+        middle = (low + high) / 2.0
+        scaled = [replace(each, limit=middle * each.limit) for each in constraints]
+        try:
+            largest = curves.find_largest(scaled, lambda _: watch(0.3), limit_um=limit_um)
+        except InfeasibleError:
+            low = middle
+            continue
+        if largest.high_um <= limit_um:
+            low = factor = middle
+        else:
+            high = middle
+    return factor
+
+
+def _conflict(
+    curves: ErrorCurves, constraints: Sequence[Constraint], watch: ProgressCallback
+) -> list[str]:
+    """Find a smallest set of tests that no machine passes, by leaving out one after the other."""
+    remaining = list(constraints)
+    for constraint in constraints:
+        watch(0.0)
+        fewer = [other for other in remaining if other is not constraint]
+        try:
+            curves.polytope(fewer).maximise(0.0 * curves.upper)
+        except InfeasibleError:
+            remaining = fewer
+    return [constraint.name for constraint in remaining]
+
+
+def _report(
+    curves: ErrorCurves,
+    worst: LargestError,
+    without_um: float,
+    tests: Sequence[tuple[PlannedTest, Constraint]],
+) -> AcceptanceResult:
+    machine = curves.build_scene(worst.machine)
+    shape = curves.grid.shape
+    at = {
+        axis: float(np.broadcast_to(values, shape).flat[worst.node])
+        for axis, values in curves.grid.coordinates.items()
+    }
+    direction = worst.error_um / max(worst.low_um, 1e-30)
+    parts = direction @ curves.gains[worst.node] * worst.machine
+    contributions = {key: float(part.sum()) for key, part in curves.by_key(parts).items()}
+    ordered = sorted(contributions.items(), key=lambda item: -abs(item[1]))
+    rows: list[TestValue] = []
+    for planned, constraint in tests:
+        first, exact = (
+            abs(run_test(machine, planned.test, exact=exact).model.outcome[constraint.quantity])
+            for exact in (False, True)
+        )
+        rows.append(TestValue(planned.name, first, planned.limit, UNITS[planned.unit], exact))
+    exact_um = evaluate_field(
+        machine.model, machine.errors, {axis: np.asarray(q) for axis, q in at.items()},
+        machine.view(), curves.grid.point_mm.reshape(-1, 3)[worst.node], exact=True,
+    ).error_um  # fmt: skip
+    errors: dict[str, Array] = curves.by_key(worst.machine)
+    title = f"{curves.scene.title}, worst machine that passes"
+    return AcceptanceResult(
+        scene=curves.scene,
+        machine=replace(machine, title=title),
+        knots=curves.knots,
+        bound_um=(worst.low_um, worst.high_um),
+        at=at,
+        direction=(float(direction[0]), float(direction[1]), float(direction[2])),
+        without_tests_um=without_um,
+        tests=tuple(rows),
+        errors={key: float(part[np.argmax(np.abs(part))]) for key, part in errors.items()},
+        contributions_um=dict(ordered),
+        second_order=compare_orders(worst.error_um, exact_um),
+    )
