@@ -32,12 +32,12 @@ class PlannedTest:
     def name(self) -> str:
         """Name of the test and its options, for lists; counts are omitted."""
         units = {setting.name: setting.unit for setting in self.test.settings()}
-        words = (
+        parts = (
             f"{_text(value)} {units[key]}".rstrip()
             for key, value in self.options.items()
             if units[key] or not isinstance(value, int)
         )
-        return " ".join([self.test.name, *words])
+        return " ".join([self.test.name, *parts])
 
 
 def plan_names() -> tuple[str, ...]:

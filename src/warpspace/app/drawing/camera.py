@@ -239,10 +239,10 @@ class TabCamera:
         """Return the views of the whole machine and of the box, for the page to move there."""
         bodies = [of.vertices_mm for of in drawn_bodies(picture, nominal=True)]
         points, room = np.concatenate([picture.drawn_mm.reshape(-1, 3), *bodies]), self.room
-        whole = fit_camera(points, room.aspect, VIEWS[self.view], self._fov_deg, room.margins)
+        machine = fit_camera(points, room.aspect, VIEWS[self.view], self._fov_deg, room.margins)
         box = self._fitted(picture)
-        self._placements = (*self._placements[-PLACEMENTS:], whole, box)
-        return whole, box
+        self._placements = (*self._placements[-PLACEMENTS:], machine, box)
+        return machine, box
 
     def place(self, picture: LivePicture) -> None:
         """Move to the wanted view, else to one of the whole box."""

@@ -328,7 +328,7 @@ class AcceptancePanel(AnalysisPanel):
             self.context.post(lambda state: self._with_plan(state, text))
 
         self.last_key = self.result_key(self.context.state)
-        self._run_job("Reading", lambda _: read(), accept)
+        self._jobs.start("Reading", lambda _: read(), accept)
 
     def _with_plan(self, state: AppState, plan: str) -> AppState:
         return replace(state, forms={**state.forms, f"{self.name}.plan": plan})
