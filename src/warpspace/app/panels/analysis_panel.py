@@ -19,7 +19,7 @@ from warpspace.analysis.description import Analysis, Change, Result
 from warpspace.analysis.options import Option
 from warpspace.analysis.registry import Entry
 from warpspace.app.browser import actions as do
-from warpspace.app.browser.html import EMPTY, join, number
+from warpspace.app.browser.html import EMPTY, join, number, tag
 from warpspace.app.browser.page import error_words
 from warpspace.app.browser.templates import Templates
 from warpspace.app.evaluation import compare
@@ -27,7 +27,7 @@ from warpspace.app.evaluation.cache import exclusive_work
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import block_html, result_html
 from warpspace.app.panels.file_dialogs import PLAIN, limit_words
-from warpspace.app.panels.panel import Context, Job, Jobs, Section, alert, on, tiny
+from warpspace.app.panels.panel import Context, Job, Jobs, Section, alert, on
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import LONGEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
@@ -167,7 +167,7 @@ class AnalysisPanel(Section):
 
     def body(self, picture: LivePicture) -> Markup:
         words = compare.present_words(picture)
-        remark = tiny(words) if words else EMPTY
+        remark = tag("p", words, class_="ws-tiny") if words else EMPTY
         return remark + self._body(picture.state)
 
     def _body(self, state: AppState) -> Markup:
@@ -232,20 +232,20 @@ class AnalysisPanel(Section):
     def cancel(self, _: do.Cancel) -> None:
         self._jobs.cancel()
 
-    @on(do.Preview)
-    def preview(self, state: AppState, action: do.Preview) -> AppState | None:
-        change = self._change(state, action.card)
-        if change is None:
+    @on(do.Preview, do.Apply)
+    def use_card(self, state: AppState, action: do.Preview | do.Apply) -> AppState | None:
+        """Compare with a proposed change, or apply it."""
+        outcome, at = self.outcome, action.card
+        if outcome is None or outcome.key != self.result_key(state) or at >= len(outcome.cards):
             return None
+        change, _ = outcome.cards[at]
+        if isinstance(action, do.Apply):
+            return self.applied(state, change)
         name = change.label if change.label.startswith("after ") else ""
         name = name or f"after {self.title.lower()}: {change.label}"
         return compare.with_proposal(state, change.scene, name)
 
-    @on(do.Apply)
-    def apply(self, state: AppState, action: do.Apply) -> AppState | None:
-        change = self._change(state, action.card)
-        if change is None:
-            return None
+    def applied(self, state: AppState, change: Change) -> AppState:
         applied_state = compare.with_applied(state, change.scene, f"before {self.title.lower()}")
         self._applied_key = self.result_key(applied_state)
         description = change.label
@@ -253,12 +253,6 @@ class AnalysisPanel(Section):
             description = description.partition(": ")[2] or description
         self.context.last_decision = state, f"{self.title}: {description}"
         return applied_state
-
-    def _change(self, state: AppState, card: int) -> Change | None:
-        outcome = self.outcome
-        if outcome is None or outcome.key != self.result_key(state) or card >= len(outcome.cards):
-            return None
-        return outcome.cards[card][0]
 
     def _run(self, state: AppState) -> None:
         key, scenes = self.result_key(state), self.scenes(state)

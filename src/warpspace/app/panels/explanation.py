@@ -11,7 +11,7 @@ from warpspace.analysis.commands.contributions import PointContribution
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.analysis.uncertainty.propagation import NAMES
 from warpspace.app.browser import actions as do
-from warpspace.app.browser.html import EMPTY, join, number
+from warpspace.app.browser.html import EMPTY, join, number, tag
 from warpspace.app.browser.templates import Templates
 from warpspace.app.drawing.camera import fit_camera
 from warpspace.app.evaluation import point_explanation
@@ -24,7 +24,7 @@ from warpspace.app.evaluation.point_explanation import (
 )
 from warpspace.app.panels.analysis_panel import AnalysisPanel
 from warpspace.app.panels.block_html import block_html
-from warpspace.app.panels.panel import Section, on, quiet, tiny
+from warpspace.app.panels.panel import Section, on
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.tree import EXAMPLE
 from warpspace.field.evaluate import placed_words
@@ -35,6 +35,7 @@ from warpspace.scene.model import evaluate_grid
 from warpspace.units import spell_count
 
 FIRST = 3  # contributions listed at first; Details lists all
+NOMINAL = "No errors: every point is at its nominal position."
 DIFFERENCE = "Contributions are not available for the difference B − A: show A or B."
 HTML = Templates("explanation")
 
@@ -58,9 +59,9 @@ class WorstPanel(Section):
 
     def body(self, picture: LivePicture) -> Markup:
         if picture.is_difference:
-            return quiet(DIFFERENCE)
+            return tag("p", DIFFERENCE, class_="ws-quiet")
         if self._is_nominal(picture):
-            return quiet("No errors: every point is at its nominal position.")
+            return tag("p", NOMINAL, class_="ws-quiet")
         explanation, state = self._explain(picture), picture.state
         at = "" if state.picked is None else _spelt(explanation.at)
         residual_um = None
@@ -121,7 +122,7 @@ def _uncertainty(explanation: PointExplanation, limit_um: float | None) -> Marku
     if uncertainty is None:
         return EMPTY
     if not uncertainty.errors.is_known:
-        return join(map(tiny, uncertainty.errors.remarks()))
+        return join(tag("p", text, class_="ws-tiny") for text in uncertainty.errors.remarks())
     variances = uncertainty.variance_shares(uncertainty.response @ uncertainty.direction)
     shares = [(key, f"{number(100.0 * share, 0)} %") for key, share in variances.items()]
     shares = [(key, share) for key, share in shares if share != "0 %"]

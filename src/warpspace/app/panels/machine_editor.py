@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from warpspace.analysis.axis_motion import AxisMotion, assemble_motion
 from warpspace.app.browser import actions as do
-from warpspace.app.browser.html import EMPTY, join
+from warpspace.app.browser.html import EMPTY, join, tag
 from warpspace.app.browser.templates import Templates
 from warpspace.app.evaluation import machine_edits
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -53,7 +53,7 @@ class RotarySection(panel.Section):
     def body(self, picture: LivePicture) -> Markup:
         state, axis = picture.state, played_axis(picture.state)
         if axis is None:
-            return panel.quiet("This machine has no rotary axis.")
+            return tag("p", "This machine has no rotary axis.", class_="ws-quiet")
         low, high = state.scene.machine.axes[axis].travel
         high = min(high, low + 359.0)  # at most one revolution
         turns = range(math.ceil(low / 90.0), math.floor(high / 90.0) + 1)

@@ -77,9 +77,6 @@ class FilesPanel(AnalysisPanel):
     def files_html(self) -> Markup:
         return HTML.files(self.name, self.files, self._upload_problem, self._uploads.html())
 
-    def upload_html(self, label: str) -> Markup:
-        return HTML.upload(label, self.name, MOST_BYTES)
-
     def receive(self, read: Callable[[], tuple[str, bytes]]) -> None:
         """Parse files in jobs, one after the other; errors are shown above the files."""
         self._uploads.start("Reading", lambda _: self.parse(*read()), self._accept)
@@ -153,9 +150,9 @@ class TestsPanel(FilesPanel):
             return HTML.test(titles, chosen)
         remark = "" if state.controller is None else without_words(state)
         test = EMPTY if picture.is_difference else self._body(state)
-        upload = EMPTY if self.files else self.upload_html("Measured readings …")
         draws_path = state.forms.get("test.path") != "0"
-        return HTML.test(titles, chosen, kind, test, remark, self.files_html(), upload, draws_path)
+        return HTML.test(titles, chosen, kind, test, remark, self.files_html(), not self.files,
+                         MOST_BYTES, draws_path)  # fmt: skip
 
     def headline(self, result: Result) -> Markup:
         return HTML.deviations(result)
@@ -243,7 +240,7 @@ class CalibratePanel(FilesPanel):
         kinds |= {name: _kind_words(name) for name in (*KINDS, *bench_names())}
         kind, _, options = self._next_kind.partition(":")
         return HTML.readings(
-            self.files_html(), not self.files, self.upload_html("Add readings …"), bundled, kinds,
+            self.name, self.files_html(), not self.files, MOST_BYTES, bundled, kinds,
             kind, options if kind in bench_names() else None,
         )  # fmt: skip
 

@@ -133,14 +133,12 @@ class NotesPanel(Panel):
             (at, on), view = self._place(state), view_of(state, self.context.camera.remember())
             note = Note(kind=kind, text=text, author=_author(state), at=at, on=on, view=view,
                         loop=state.loop.value)  # fmt: skip
-            if self._before_decision is not None and kind == "decision":
-                before = note_tables.note_numbers(self._before_decision.resulting_scene(), [note])[
-                    0
-                ]
-                note = replace(note, before=before, change=_changes(self._before_decision, state))
-            note = replace(
-                note, numbers=note_tables.note_numbers(state.resulting_scene(), [note])[0]
-            )
+            decided = self._before_decision
+            if decided is not None and kind == "decision":
+                (before,) = note_tables.note_numbers(decided.resulting_scene(), [note])
+                note = replace(note, before=before, change=_changes(decided, state))
+            (numbers,) = note_tables.note_numbers(state.resulting_scene(), [note])
+            note = replace(note, numbers=numbers)
         return _opened(replace(state, review=with_note(state.review, note)), LIST)
 
     def _place(self, state: AppState) -> tuple[Mapping[str, float], NoteAnchor | None]:

@@ -332,14 +332,6 @@ class Dialog(Panel):
         return {"window": HTML.dialog(self.name, self.title, self.body(picture))}
 
 
-def tiny(text: object) -> Markup:
-    return tag("p", text, class_="ws-tiny")
-
-
-def quiet(text: object) -> Markup:
-    return tag("p", text, class_="ws-quiet")
-
-
 def alert(text: object) -> Markup:
     return tag("p", text, class_="ws-problem", role="alert")
 

@@ -189,11 +189,9 @@ class ImportPanel(FilesPanel):
     def actions(self, result: description.Result, *, stale: bool) -> Markup:
         return EMPTY
 
-    def apply(self, state: AppState, action: do.Apply) -> AppState | None:
+    def applied(self, state: AppState, change: description.Change) -> AppState:
         """Apply an import, and record the file of each error that it changes."""
-        changed = super().apply(state, action)
-        if changed is None:
-            return None
+        changed = super().applied(state, change)
         names = ", ".join(file.name for file in self.files)
         curves = {key: changed.curve(key) for key in changed.amplitudes}
         imported = {
