@@ -52,7 +52,7 @@ def test_options_are_those_of_the_bench(scene):
     assert (test.test.plane, test.test.radius_mm) == ("YZ", 50.25)
     assert dict(test.test.at) == {"X": 20.0}
     assert (test.limit, test.unit, test.minutes) == (8.0, "um", 15.0)
-    assert test.name == "circular YZ 50.25 X=20"
+    assert test.name == "circular YZ 50.25 mm X=20"
 
 
 @pytest.mark.parametrize(
