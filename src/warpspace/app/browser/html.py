@@ -38,17 +38,12 @@ def join(parts: Iterable[object]) -> Markup:
 
 def attributes(**values: object) -> Markup:
     """Format attributes; None and False omit one, True gives no value, ``_`` becomes ``-``."""
-    markup = "".join(
-        f" {_spelt(name)}" if value is True else f' {_spelt(name)}="{text(value)}"'
-        for name, value in values.items()
-        if value is not None and value is not False
-    )
+    markup = ""
+    for name, value in values.items():
+        if value is not None and value is not False:
+            markup += f" {name.strip('_').replace('_', '-')}"
+            markup += "" if value is True else f'="{text(value)}"'
     return Markup(markup)  # noqa: S704 - escaped here
-
-
-@lru_cache(maxsize=256)
-def _spelt(name: str) -> str:
-    return name.strip("_").replace("_", "-")
 
 
 def tag(name: str, body: object = "", **values: object) -> Markup:

@@ -143,9 +143,8 @@ def _traces(picture: LivePicture) -> Iterator[Label]:
     """Name each trace at its largest error, the largest first."""
     for line in sorted(picture.moved_traces.values(), key=lambda line: -line.largest_um):
         worst = int(np.argmax(np.linalg.norm(line.error_um, axis=-1)))
-        yield Label(
-            f"{trace_label(picture, line)}: {_spell(line.largest_um)}", line.actual_mm[worst]
-        )
+        text = f"{trace_label(picture, line)}: {_spell(line.largest_um)}"
+        yield Label(text, line.actual_mm[worst])
 
 
 def _worst(picture: LivePicture) -> Iterator[Label]:

@@ -84,15 +84,11 @@ def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState)
     view = "b" if refused and chosen.shown == "difference" else chosen.shown
     drawn, other = {"a": (a, b), "b": (b, a), "difference": (difference or b, None)}[view]
     alike = other is not None and other.drawn_mm.shape == drawn.drawn_mm.shape
+    titles = _title(state, chosen.a), _title(state, other_side, chosen.a)
+    change = None if difference is None else difference.statistics
+    other_mm = other.drawn_mm if other is not None and alike else None
     compared = Compared(
-        view,
-        (_title(state, chosen.a), _title(state, other_side, chosen.a)),
-        (a.state, b.state),
-        a.statistics,
-        b.statistics,
-        None if difference is None else difference.statistics,
-        other.drawn_mm if other is not None and alike else None,
-        refused,
+        view, titles, (a.state, b.state), a.statistics, b.statistics, change, other_mm, refused
     )
     colours = drawn.scale if drawn.is_difference else scale
     return replace(drawn, state=state, colours=colours, compared=compared)
@@ -171,10 +167,6 @@ def applied(state: AppState, scene: Scene) -> AppState:
 def with_proposal(state: AppState, scene: Scene, title: str) -> AppState:
     b = Side(title, applied(plain_state(state), scene))
     return replace(state, comparison=replace(state.comparison, a=Side(), b=b, pinned=b, shown="b"))
-
-
-def with_applied(state: AppState, scene: Scene, before: str) -> AppState:
-    return applied(with_before(state, Side(before, plain_state(state))), scene)
 
 
 # --- The applied compensation table ---------------------------------------------------------------

@@ -28,7 +28,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import block_html, result_html
 from warpspace.app.panels.file_dialogs import PLAIN, limit_words
 from warpspace.app.panels.panel import Context, Job, Jobs, Section, alert, on
-from warpspace.app.state.app_state import AppState
+from warpspace.app.state.app_state import AppState, Side
 from warpspace.app.state.form_values import LONGEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
 from warpspace.exceptions import WarpspaceError
@@ -246,12 +246,11 @@ class AnalysisPanel(Section):
         return compare.with_proposal(state, change.scene, name)
 
     def applied(self, state: AppState, change: Change) -> AppState:
-        applied_state = compare.with_applied(state, change.scene, f"before {self.title.lower()}")
+        before = Side(f"before {self.title.lower()}", compare.plain_state(state))
+        applied_state = compare.applied(compare.with_before(state, before), change.scene)
         self._applied_key = self.result_key(applied_state)
-        description = change.label
-        if description.startswith("after "):
-            description = description.partition(": ")[2] or description
-        self.context.last_decision = state, f"{self.title}: {description}"
+        text = change.label.partition(": ")[2] if change.label.startswith("after ") else ""
+        self.context.last_decision = state, f"{self.title}: {text or change.label}"
         return applied_state
 
     def _run(self, state: AppState) -> None:

@@ -170,22 +170,19 @@ class ConventionsSection(Section):
             at = {**scene.workspace.positions, **scene.reference}
             reference = " ".join(f"{axis} {at[axis]:g}" for axis in linear_spans(scene))
         has_point = state.picked is not None and state.picked.point_mm is None
-        groups = choice_groups(scene)
         return HTML.conventions(
-            groups, in_force, scene_choices, effects, reference, has_point, costs
+            choice_groups(scene), in_force, scene_choices, effects, reference, has_point, costs
         )
 
     @on(do.Input.CHOOSE_CONVENTION)
     def choose(self, state: AppState, choice: str) -> AppState:
         return with_choice(state, choice)
 
-    @on(do.Signal.RESET_CONVENTIONS)
-    def reset(self, state: AppState) -> AppState:
-        return with_own_conventions(state)
-
-    @on(do.Signal.USE_PICKED_REFERENCE)
-    def use_picked(self, state: AppState) -> AppState | None:
-        return None if state.picked is None else with_reference(state, state.picked.at)
+    @on(do.Signal.RESET_CONVENTIONS, do.Signal.USE_PICKED_REFERENCE)
+    def reset(self, state: AppState, signal: do.Signal) -> AppState | None:
+        if signal is do.Signal.RESET_CONVENTIONS:
+            return with_own_conventions(state)
+        return state.picked and with_reference(state, state.picked.at)
 
     @on(do.Input.SET_REFERENCE)
     def set_reference(self, state: AppState, text: str) -> AppState:

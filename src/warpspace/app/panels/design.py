@@ -144,10 +144,9 @@ class TolerancesPanel(AnalysisPanel):
 
     @on(do.Input.SCALE_TOLERANCES)
     def scale(self, state: AppState, label: str) -> AppState | None:
-        factor = SCALES.get(label)
-        if factor is None:
+        if label not in SCALES:
             return None
-        return edits.with_scaled_tolerances(state, self._order[1], factor)
+        return edits.with_scaled_tolerances(state, self._order[1], SCALES[label])
 
     @on(do.Signal.RESET_TOLERANCES)
     def reset(self, state: AppState) -> AppState:

@@ -94,12 +94,6 @@ def _read(
     return function, (*ignored, *tidied)
 
 
-def sample_curve(function: ErrorFunction, span: tuple[float, float]) -> tuple[Array, Array]:
-    inside = [q for q in function.kinks if span[0] < q < span[1]][:MAX_KINKS]
-    at = np.unique(np.concatenate([np.linspace(*span, CHART_SAMPLES), inside]))
-    return at, _finite(function.evaluate(at))
-
-
 # --- The row of an error --------------------------------------------------------------------------
 
 MOST_READINGS = 400  # drawn, evenly spaced
@@ -182,7 +176,10 @@ def origin_words(state: AppState, key: str) -> tuple[str, bool]:
 
 def _chart(state: AppState, row: Parameter, function: ErrorFunction) -> Lines:
     unit = state.scene.machine.axes[row.axis].unit
-    at, value = sample_curve(function, state.axis_span(row.key))
+    span = state.axis_span(row.key)
+    inside = [q for q in function.kinks if span[0] < q < span[1]][:MAX_KINKS]
+    at = np.unique(np.concatenate([np.linspace(*span, CHART_SAMPLES), inside]))
+    value = _finite(function.evaluate(at))
     curves = [Curve("", at, value)]
     if function.has_directions or len(function.lines) > 1:
         styles = ("thin", "dashed")

@@ -16,12 +16,7 @@ from warpspace.app.browser.templates import Templates
 from warpspace.app.drawing.camera import fit_camera
 from warpspace.app.evaluation import point_explanation
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.point_explanation import (
-    POINTS,
-    PointExplanation,
-    explain_point,
-    pick_worst,
-)
+from warpspace.app.evaluation.point_explanation import POINTS, explain_point, pick_worst
 from warpspace.app.panels.analysis_panel import AnalysisPanel
 from warpspace.app.panels.block_html import block_html
 from warpspace.app.panels.panel import Section, on
@@ -45,7 +40,7 @@ class WorstPanel(Section):
 
     name, task, title = "worst", "understand", "Worst point"
     sentence = "Contributions to the largest error of the volume"
-    _explanation: tuple[LivePicture, PointExplanation] | None = None
+    _explanation: tuple[LivePicture, point_explanation.PointExplanation] | None = None
 
     def heading(self, picture: LivePicture) -> str:
         if picture.is_difference or self._is_nominal(picture):
@@ -74,7 +69,7 @@ class WorstPanel(Section):
     def _is_nominal(self, picture: LivePicture) -> bool:
         return picture.state.picked is None and not picture.field.error_um.any()
 
-    def _explain(self, picture: LivePicture) -> PointExplanation:
+    def _explain(self, picture: LivePicture) -> point_explanation.PointExplanation:
         if self._explanation is None or self._explanation[0] is not picture:
             picked = picture.state.picked or pick_worst(picture)
             explanation = explain_point(picture.drawn_state, picked, picture.exaggeration)
@@ -113,7 +108,7 @@ def _spelt(positions: Mapping[str, float]) -> str:
     return formatting.spell_axes(positions).removeprefix("axes ")
 
 
-def _uncertainty(explanation: PointExplanation, limit_um: float | None) -> Markup:
+def _uncertainty(explanation: point_explanation.PointExplanation, limit_um: float | None) -> Markup:
     """Render the probability of meeting the limit and the variance shares of |E|, largest first.
 
     Negative correlations give negative shares; all shares add up to 100 %.
@@ -132,7 +127,7 @@ def _uncertainty(explanation: PointExplanation, limit_um: float | None) -> Marku
     return HTML.uncertainty(length_words(uncertainty), shares, FIRST, limit_um, probability)
 
 
-def _details(explanation: PointExplanation, lever: str) -> Markup:
+def _details(explanation: point_explanation.PointExplanation, lever: str) -> Markup:
     point, ranked = explanation.explanation, explanation.ranked
     lines: list[tuple[object, ...]] = [
         (HTML.axis_lever(c.key, parameter(c.key), c.key == lever), c.along_um, *c.error_um)

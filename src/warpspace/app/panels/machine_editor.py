@@ -108,7 +108,7 @@ class EditorSection(panel.Section):
 
     def body(self, picture: LivePicture) -> Markup:
         scene = picture.state.scene
-        chain, tables = scene.machine.chain, machine_edits.tables_of(scene)
+        tables = machine_edits.tables_of(scene)
         numbers = {
             quantity: {frame: list(map(spell_typed, row)) for frame, row in table.items()}
             for quantity, table in tables.items()
@@ -119,16 +119,7 @@ class EditorSection(panel.Section):
             for axis, gantry in scene.machine.gantries.items()
         }
         bodies = {frame: _source(source) for frame, source in tables["mesh"].items()}
-        return HTML.editor(
-            str(chain),
-            self._problem,
-            scene.machine,
-            numbers,
-            machine_edits.UNITS,
-            guides,
-            bodies,
-            scene.notes,
-        )
+        return HTML.editor(scene, self._problem, numbers, machine_edits.UNITS, guides, bodies)
 
     @panel.on(do.EditMachine)
     def edit(self, state: AppState, action: do.EditMachine) -> AppState:

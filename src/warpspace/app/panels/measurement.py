@@ -23,7 +23,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import chosen_test, plan_test
 from warpspace.app.panels.analysis_panel import AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
-from warpspace.app.panels.panel import Context, Jobs, on
+from warpspace.app.panels.panel import Context, Jobs, on, with_section
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import TEST, with_form
@@ -166,8 +166,8 @@ class TestsPanel(FilesPanel):
             return None
         self.outcome, self.files, self._upload_problem = None, (), ""
         other_forms = {k: v for k, v in state.forms.items() if k.partition(".")[0] != TEST}
-        page = replace(state.page, task=self.task, open=state.page.open | {TEST})
-        state = replace(state, page=page, forms=other_forms | ({TEST: test} if test else {}))
+        state = with_section(state, self.task, TEST)
+        state = replace(state, forms=other_forms | ({TEST: test} if test else {}))
         return edits.with_sight(state, inside=bool(test))
 
     def set_option(self, state: AppState, action: do.SetOption) -> AppState | None:
@@ -268,7 +268,6 @@ class CalibratePanel(FilesPanel):
     def add_bundled(self, name: str) -> None:
         if name in bundled_data():
             self.receive(lambda: (name, find_data(name).read_bytes()))
-            self.rerender()
 
     @on(do.Input.SHOW_RESIDUALS)
     def show_residuals(self, state: AppState, arrows: str) -> AppState:

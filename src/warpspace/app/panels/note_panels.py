@@ -102,7 +102,20 @@ class NotesPanel(Panel):
     @on(do.EditNote)
     def edit(self, state: AppState, action: do.EditNote) -> AppState | None:
         note = _find_note(state, action.note)
-        return note and _update_note(state, note, action.edit)
+        if note is None:
+            return None
+        match action.edit:
+            case "delete":
+                return replace(state, review=tuple(n for n in state.review if n is not note))
+            case "edit":
+                return _opened(state, note.id, note.kind, text=note.text)
+            case "revert":
+                return _revert_decision(state, note)
+            case "status":
+                changed = note.edited(status="done" if note.status == "open" else "open")
+                return replace(state, review=with_note(state.review, changed))
+            case move:
+                return _move_step(state, note, move)
 
     @on(do.ChooseVersion)
     def choose_version(self, state: AppState, action: do.ChooseVersion) -> AppState | None:
@@ -186,21 +199,6 @@ def _author(state: AppState) -> str:
 
 def _find_note(state: AppState, note_id: str) -> Note | None:
     return next((note for note in state.review if note.id == note_id), None)
-
-
-def _update_note(state: AppState, note: Note, edit: str) -> AppState:
-    match edit:
-        case "delete":
-            return replace(state, review=tuple(n for n in state.review if n is not note))
-        case "edit":
-            return _opened(state, note.id, note.kind, text=note.text)
-        case "revert":
-            return _revert_decision(state, note)
-        case "status":
-            changed = note.edited(status="done" if note.status == "open" else "open")
-            return replace(state, review=with_note(state.review, changed))
-        case _:
-            return _move_step(state, note, edit)
 
 
 def _move_step(state: AppState, note: Note, move: str) -> AppState:
