@@ -103,9 +103,9 @@ def marked(picture: LivePicture) -> dict[str, float]:
 
 def legend_html(picture: LivePicture) -> Markup:
     scale, named, limit = picture.scale, marks(picture), picture.exceeded_um
-    words = f"Colours from {spell_short(scale.low)} to {spell_short(scale.high)} {scale.unit}: "
+    label = f"Colours from {spell_short(scale.low)} to {spell_short(scale.high)} {scale.unit}: "
     return HTML.legend(
-        scale, words + ", ".join(mark.text for mark in named), _stops(scale),
+        scale, label + ", ".join(mark.text for mark in named), _stops(scale),
         None if limit is None else 100.0 * min(limit / scale.high, 1.0), named,
         ticks(scale, picture.shown_values), faded_words(picture), unmeasured_mm(picture).size,
     )  # fmt: skip

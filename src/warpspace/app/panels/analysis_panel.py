@@ -166,8 +166,8 @@ class AnalysisPanel(Section):
         return (self.result_key(picture.state), compare.present_words(picture))
 
     def body(self, picture: LivePicture) -> Markup:
-        words = compare.present_words(picture)
-        remark = tag("p", words, class_="ws-tiny") if words else EMPTY
+        text = compare.present_words(picture)
+        remark = tag("p", text, class_="ws-tiny") if text else EMPTY
         return remark + self._body(picture.state)
 
     def _body(self, state: AppState) -> Markup:
