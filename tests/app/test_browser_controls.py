@@ -3,6 +3,8 @@
 import pytest
 
 from app.page_tab import Tab
+from page_client import selector
+from warpspace.app.browser import actions as do
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import SAME_STEP_S
 from warpspace.scene.library import load_scene
@@ -52,6 +54,20 @@ def test_a_rejected_value_reverts_with_the_reason(tab: Tab):
         box.press("Enter")
         tab.says("exaggeration = ", within="#ws-toasts")
         tab.until(lambda value=value: box.input_value() == value)
+
+
+def test_the_same_rejected_text_reverts_each_time(tab: Tab):
+    """The second time the HTML is the same, so that only `settle` reverts the box."""
+    tab.task("Machine")
+    tab.unfold("Edit the machine")
+    box = tab.page.locator(selector(do.EditMachine("chain"), "set"))
+    accepted = box.input_value()
+    for _ in range(3):
+        box.click()
+        tab.page.keyboard.press("Control+a")
+        tab.page.keyboard.type("nonsense")
+        tab.page.keyboard.press("Enter")
+        tab.until(lambda: box.input_value() == accepted, seconds=10.0)
 
 
 def test_a_list_with_new_choices_shows_the_selected_one(tab: Tab):

@@ -262,7 +262,10 @@ def _bars_html(bars: Bars) -> str:
 
 
 def _bar(panel: Panel, row: int) -> str:
-    numbers = [(series.values[row], series.form or ".2f") for series in panel.series]
+    numbers = [
+        (series.values[row], Column("", series.form or ".2f", panel.unit).rounded.form)
+        for series in panel.series
+    ]
     everything = [abs(v) for series in panel.series for v in series.values if v is not None]
     longest = max((*everything, panel.before or 0.0)) or 1.0
     parts = "".join(

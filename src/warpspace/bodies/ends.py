@@ -97,6 +97,7 @@ class Head:
             if share > _COAXIAL:
                 if nose is not None:
                     self._add_spindle(nose, top)
+                    nose = None
                 top = self._add_swivel(axis, top)
                 continue
             add = self._add_fork if share < _ACROSS else self._add_nutator
@@ -167,15 +168,14 @@ class Head:
         hub = np.array([*self.centre, pivot])
         height = (pivot + 0.9 * u - foot) / 2.0
         body = block([*self.centre, foot + height], half(0.95 * u, 0.9 * u, height))
-        across = rod(hub - 1.35 * u * out, hub + 1.35 * u * out, 0.75 * u)
+        across = rod(hub - 1.3 * u * out, hub + 1.3 * u * out, 0.75 * u)
         self._add(axis.name, "head", body, across)
         roof, rise = pivot + 1.15 * u, 1.15 * u / 2.0
         for side in (-1.65 * u, 1.65 * u):
             arm = hub + side * out
             body = block(arm + np.array([0, 0, rise]), half(0.27 * u, 0.75 * u, rise))
-            self._add(
-                parent, "fork", body, rod(arm - 0.27 * u * out, arm + 0.27 * u * out, 0.75 * u)
-            )
+            boss = (0.27 + _BOSS) * u * out
+            self._add(parent, "fork", body, rod(arm - boss, arm + boss, 0.75 * u))
         body = block([*self.centre, roof + 0.3 * u], half(1.92 * u, 0.85 * u, 0.3 * u))
         self._add(parent, "fork", body)
         return roof + 0.6 * u

@@ -30,7 +30,7 @@ from warpspace.parts.workpiece import (
     subtract_best_fit,
 )
 from warpspace.scene.model import Scene, second_order
-from warpspace.units import Array
+from warpspace.units import Array, spell_fixed
 
 MAX_EVALUATED_VERTICES = 4000  # at each place; of larger meshes a sample and the outermost ones
 OUTERMOST = 200  # directions
@@ -176,7 +176,7 @@ class ClampResult(Result):
     def blocks(self) -> Iterator[Block]:
         quantity = "largest |E|" + " after the best rigid fit" * self.placed
         yield f"{self.title}: {len(self.places):,} places"
-        yield f"  the best one reduces the {quantity} by {self.gain_um:.2f} µm"
+        yield f"  the best one reduces the {quantity} by {spell_fixed(self.gain_um)} µm"
         if self.expanded_uncertainty:
             name, gain = U95[self.placed], plus_minus(self.expanded_uncertainty["u95_gain_um"])
             now, best = (

@@ -36,7 +36,7 @@ from warpspace.parts.workpiece import (
 )
 from warpspace.scene.model import Scene, second_order
 from warpspace.scene.text_files import read_text
-from warpspace.units import MM_PER_UM, Array
+from warpspace.units import MM_PER_UM, Array, spell_fixed
 
 REPORTED_UM = 0.5  # interpolation errors that are reported
 MAX_NOISE_UM = 1000.0
@@ -208,7 +208,8 @@ class PartResult(PartDeviation, Result):
         at = ", ".join(f"{value:.6g}" for value in self.workpiece.place)
         yield f"{self.scene.title} · {self.workpiece.name}, {self.vertices:,} vertices"
         yield f"  clamped at {at} mm and degrees"
-        yield f"  largest |E| {self.deviation.max_um:.2f} µm at x {x:.3f}, y {y:.3f}, z {z:.3f} mm"
+        largest = spell_fixed(self.deviation.max_um)
+        yield f"  largest |E| {largest} µm at x {x:.3f}, y {y:.3f}, z {z:.3f} mm"
         yield "  Geometry only: no forces, heat, wear or servo"
         states: dict[str, PartDeviation] = {"as cut": self, "placed": self.placed}
         ends = "min_um", "max_um"

@@ -79,7 +79,7 @@ def spell_at(axes: Mapping[str, SupportsFloat]) -> str:
 
 def u95_behind(u95: float | None) -> str:
     """Format U95 to follow a number, `` ± 1.2``; unknown (None): `` ± ?``."""
-    return f" {plus_minus(u95, '.2g' if u95 and u95 < 0.95 else '.1f')}"
+    return f" {plus_minus(u95)}"
 
 
 def length_words(uncertainty: FieldUncertainty | None, point: int = 0) -> str:

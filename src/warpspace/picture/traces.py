@@ -15,7 +15,7 @@ from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.definition import Vector
 from warpspace.scene.model import Scene
-from warpspace.units import Array, spell_short
+from warpspace.units import Array, spell_fixed, spell_short
 
 SAMPLES = 121
 TILT_STEP_DEG = 30.0
@@ -221,8 +221,8 @@ def motion_lines(name: str, motion: AxisMotion, part: ErrorMotion) -> Lines:
     """Build the polar chart of one deviation over the position of its axis."""
     turns = turn_words(part.times_a_turn) if motion.closed else "an arc"
     values = (
-        f"peak to valley {part.peak_to_valley:.2f} {part.unit}, {turns};"
-        f" {part.motion_value:.2f} {part.unit} about the average line"
+        f"peak to valley {spell_fixed(part.peak_to_valley)} {part.unit}, {turns};"
+        f" {spell_fixed(part.motion_value)} {part.unit} about the average line"
     )
     towards = f"actual − nominal, + {POSITIVE[part.name]}"
     return Lines(

@@ -1,6 +1,7 @@
 """What holds for every analysis: command, JSON, options, hostile text, a stop."""
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import dataclass, fields, replace
@@ -13,11 +14,21 @@ from click.testing import CliRunner
 
 from warpspace import load_scene
 from warpspace.analysis import Analysis, Quantity, Result, option, register, unregister
-from warpspace.analysis.blocks import Bars, Column, Histogram, Lines, Table, table_html
+from warpspace.analysis.blocks import (
+    Bars,
+    Column,
+    Histogram,
+    Lines,
+    Panel,
+    Series,
+    Table,
+    blocks_html,
+    table_html,
+)
 from warpspace.analysis.description import ExpandedUncertainty, ignore_progress, to_json
 from warpspace.analysis.options import options_of
 from warpspace.analysis.registry import TASKS, entries, first_line
-from warpspace.analysis.uncertainty.propagation import scene_uncertainty
+from warpspace.analysis.uncertainty.propagation import plus_minus, scene_uncertainty
 from warpspace.cli.analyses import command_of, print_blocks
 from warpspace.cli.file_arguments import guarded
 from warpspace.exceptions import OptionError, WarpspaceError
@@ -94,6 +105,14 @@ def test_errors_have_two_decimals_in_tables_of_commands_and_one_on_pages():
     assert table.cells(rounded=False) == [["36.05", "-0.26", "12.34"], ["0.04", "+1.00", "0.04"]]
     assert table.cells() == [["36.0", "-0.3", "12.34"], ["0.0", "+1.0", "0.04"]]
     assert '<td class="number">36.0</td>' in table_html(table)
+    bars = Bars(
+        "",
+        "",
+        ["a"],
+        (Panel("|E|", (Series([36.05]),), "µm"), Panel("share", (Series([36.05]),), "%")),
+    )
+    assert [*re.findall(r">([0-9.]+)</div>", blocks_html([bars]))] == ["36.0", "36.05"]
+    assert [*map(plus_minus, (3.417, 0.0341, 0.0, None))] == ["± 3.4", "± 0.034", "± 0.0", "± ?"]
 
 
 @EVERY
@@ -113,6 +132,9 @@ def test_text_page_and_json_say_the_result(entry, scene, capsys):
     print_blocks(result.blocks())
     text = capsys.readouterr().out
     assert max(map(len, text.splitlines())) <= 80
+    sentences = [block for block in result.blocks() if isinstance(block, str)]
+    unrounded = [text for text in sentences if re.search(r"\d\.\d\d µ(m|rad)\b(?!/)", text)]
+    assert not unrounded or entry.name == "calibrate"  # it states the scatter of readings
     page = result._repr_html_()
     for table in result.blocks_of(Table):
         for cells, output in ((table.cells(rounded=False), text), (table.cells(), page)):

@@ -28,7 +28,7 @@ from warpspace.machine.axes import Parameter, parameter
 from warpspace.machine.errors import Tolerance
 from warpspace.machine.limits import MAX_ERROR, MAX_TEXT, MIN_HALF_WIDTH, REPAIR_COUNT, REPAIR_NODES
 from warpspace.scene.model import Scene, evaluate_grid, grid_basis, second_order, with_placement
-from warpspace.units import Array, spell, spell_short
+from warpspace.units import Array, spell, spell_fixed, spell_short
 
 DEFAULT_LIMIT = 200.0  # µm or µrad by which an error may be changed, unless somebody says otherwise
 PLACEMENT_ONLY = 1e-9  # share of its effect that remains of an error which is only a placement
@@ -259,7 +259,7 @@ class AdjustResult(description.Result):
     def blocks(self) -> Iterator[Block]:
         smallest = f"smallest {OBJECTIVE_WORDS[self.objective]}"
         yield " · ".join((self.scene.title, *self._where, smallest))
-        mean, rms, p95, largest = (f"{getattr(self.before, name):.2f}" for name in FOUR)
+        mean, rms, p95, largest = (spell_fixed(getattr(self.before, name)) for name in FOUR)
         yield f"  before: mean {mean}, RMS {rms}, P95 {p95}, max {largest} µm"
         uncertainty = propagation.scene_uncertainty(self.scene, self.view.loop)
         yield from propagation.u95_lines(uncertainty, {"": self.before})

@@ -25,7 +25,7 @@ from warpspace.machine.axes import parameter
 from warpspace.machine.errors import TOLERANCE_CLASSES, ErrorSet, ToleranceSet
 from warpspace.machine.limits import LIMIT_UM, MOST_CONCEPTS
 from warpspace.scene.model import Scene
-from warpspace.units import Array
+from warpspace.units import Array, spell_fixed
 
 THREE = ("mean", "P95", "max")
 NAMED = 3  # errors that are named of each machine
@@ -149,7 +149,8 @@ class ConceptsResult(Result):
         yield Table(self._columns(), [self._row(*pair) for pair in lettered])
         means = [concept.sampled.mean_um for concept in self.concepts]
         if len(set(means)) > 1:
-            yield f"  {LETTERS[means.index(min(means))]} has the smallest mean, {min(means):.2f} µm"
+            best = LETTERS[means.index(min(means))]
+            yield f"  {best} has the smallest mean, {spell_fixed(min(means))} µm"
 
     def _columns(self) -> tuple[Column, ...]:
         limit = self.analysis.limit_um

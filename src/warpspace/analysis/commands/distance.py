@@ -18,7 +18,7 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Coordinates, Loop
 from warpspace.scene.model import Scene, with_placement
-from warpspace.units import MINUS, UM_PER_MM, URAD_PER_RAD, Array
+from warpspace.units import MINUS, UM_PER_MM, URAD_PER_RAD, Array, spell_change
 
 RIGHT_RAD = 1e-6  # a nominal angle this close to 90° is a right one: its deviation is a squareness
 
@@ -168,5 +168,5 @@ class DistanceResult(Result):
             yield f"angle at {place_words(self.at[2])}: {nominal:.6f}° → {actual:.6f}°"
             yield (
                 f"  {kind} of the edge to {end} against the edge to {start}:"
-                f" {self.deviation_urad:+.2f} µrad{angle}; positive is wider"
+                f" {spell_change(self.deviation_urad)} µrad{angle}; positive is wider"
             )

@@ -14,7 +14,7 @@ from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene, check_magnitude, evaluate
-from warpspace.units import Array
+from warpspace.units import Array, spell_fixed
 
 MAX_ROWS = 21  # points that the table of a longer line shows; the file has all
 
@@ -112,7 +112,7 @@ class LineResult(Result):
         yield f"{self.title} · {self.length_mm:.1f} mm"
         u95 = [self.expanded_uncertainty["u95_norm_um"]] if self.expanded_uncertainty else []
         about = f" {plus_minus(u95[0][worst] if u95 else None)}" if self.uncertainty else ""
-        yield f"  largest |E| {norm[worst]:.2f}{about} µm at {place_words(place)}"
+        yield f"  largest |E| {spell_fixed(norm[worst])}{about} µm at {place_words(place)}"
         columns = self.along_mm, *self.axes.values(), norm, *u95
         everything = np.column_stack([*columns, self.error_um, self.orientation_urad])
         step = -(-(len(norm) - 1) // (MAX_ROWS - 1)) if len(norm) > MAX_ROWS else 1

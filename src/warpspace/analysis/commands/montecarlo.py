@@ -30,6 +30,7 @@ from warpspace.machine.errors import TOLERANCE_CLASSES
 from warpspace.machine.limits import MAX_ERROR, MIN_HALF_WIDTH, SWEEP_CASES
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import parse_number, parse_whole
+from warpspace.units import spell_fixed
 
 NUMBERS = {
     "mean": "mean_um", "RMS": "rms_um", "median": "median_um", "P95": "p95_um", "P99": "p99_um",
@@ -307,9 +308,9 @@ class MonteCarloResult(Result):
         settings = self._settings(sampled)
         yield f"{scene.title} · {settings}"
         yield (
-            f"  mean {sampled.mean_um:.2f}, mode {sampled.mode_um:.1f},"
-            f" median {sampled.median_um:.2f}, P95 {sampled.p95_um:.2f},"
-            f" P99 {sampled.p99_um:.2f}, max {sampled.max_um:.2f} µm"
+            f"  mean {spell_fixed(sampled.mean_um)}, mode {spell_fixed(sampled.mode_um)},"
+            f" median {spell_fixed(sampled.median_um)}, P95 {spell_fixed(sampled.p95_um)},"
+            f" P99 {spell_fixed(sampled.p99_um)}, max {spell_fixed(sampled.max_um)} µm"
         )
         printed: dict[str, PrintedNumber] = {}
         if analysis.over is Reduction.SAMPLED:
@@ -320,7 +321,7 @@ class MonteCarloResult(Result):
             variance, offset = expected_square(sampled.case)
             expected_um = math.sqrt(variance.sum() + offset)
             yield (
-                f"  RMS  {sampled.rms_um:.2f} µm sampled, {expected_um:.2f} µm"
+                f"  RMS  {spell_fixed(sampled.rms_um)} µm sampled, {spell_fixed(expected_um)} µm"
                 " from trace(J Σ Jᵀ) without sampling"
             )
         yield from (f"  {number.quotation}" for number in printed.values())

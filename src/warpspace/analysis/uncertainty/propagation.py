@@ -488,5 +488,7 @@ def u95_lines(uncertainty: UncertaintySource | None, named: Mapping[str, Summary
     yield from (f"  {remark}" for remark in uncertainty.remarks())
 
 
-def plus_minus(u95: float | None, form: str = ".2f") -> str:
+def plus_minus(u95: float | None, form: str = "") -> str:
+    """Format U95: one decimal, below 0.95 two digits; unknown (None): ``± ?``."""
+    form = form or (".2g" if u95 and u95 < 0.95 else ".1f")
     return f"± {'?' if u95 is None else format(u95, form)}"

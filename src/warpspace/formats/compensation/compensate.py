@@ -31,7 +31,7 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import TravelDirection
 from warpspace.scene.model import Scene, with_direction, with_placement
 from warpspace.scene.text_files import parse_whole
-from warpspace.units import Array
+from warpspace.units import Array, spell_fixed
 
 SMALL_NODES = 7  # nodes and points per axis with which the placement of a workpiece is fitted
 STEP = 1000.0  # µm and µrad; change of a placement that measures the response of a table
@@ -266,7 +266,8 @@ class Compensation(BeforeAfter, Result):
         yield from u95_lines(self.field_uncertainty and self.field_uncertainty.errors, named)
         rms = self.expected.get("expected_rms_um")
         if rms is not None:
-            yield f"  expected RMS on the machine {rms:.2f} µm, with the uncertainty of its errors"
+            expected = f"{spell_fixed(rms)} µm, with the uncertainty of its errors"
+            yield f"  expected RMS on the machine {expected}"
         axes = ", ".join(self.axes)
         yield f"  {self.controller.size} numbers; corrected: {axes}; {self.points_text}"
         yield from (f"  assumed: {text}" for text in self.assumed)

@@ -32,7 +32,7 @@ from warpspace.outputs.charts.block_charts import (
     style,
 )
 from warpspace.outputs.drawing.settings import DARK, LIGHT
-from warpspace.units import Array
+from warpspace.units import Array, spell_fixed
 
 if TYPE_CHECKING:
     from warpspace.bench.base import BenchResult
@@ -195,7 +195,7 @@ def _fields(compensation: "Compensation") -> Sequence[tuple[str, "ErrorField", f
     before, after = compensation.before, compensation.after
     largest, residual = (max(float(field.norm_um.max()), LEAST_UM) for field in (before, after))
     texts = [
-        f"mean {summary.mean_um:.2f}, max {summary.max_um:.2f} µm"
+        f"mean {spell_fixed(summary.mean_um)}, max {spell_fixed(summary.max_um)} µm"
         for summary in (compensation.before_statistics, compensation.after_statistics)
     ]
     return (
