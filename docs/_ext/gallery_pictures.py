@@ -30,6 +30,7 @@ ORDER = (
     "adjust",
     "ballbar",
     "concepts",
+    "acceptance",
     "animation",
     "own_plotter",
     "exports",

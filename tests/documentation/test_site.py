@@ -217,15 +217,17 @@ def test_every_picture_that_is_linked_exists_and_every_other_picture_is_linked()
     linked = {
         (page.parent / target).resolve()
         for page in (ROOT / "README.md", ROOT / "CONVENTIONS.md", *DOCS.glob("*.md"))
-        for target in re.findall(r"!\[[^\]]+\]\(([^)]+\.png)\)", page.read_text("utf-8"))
+        for target in re.findall(r"!\[[^\]]+\]\(([^)]+\.(?:png|webp))\)", page.read_text("utf-8"))
     }
     machines = (ROOT / "assets" / "machines").glob("*/picture.png")
-    assert linked == {*(ROOT / "docs" / "images").glob("*.png"), *machines}
+    images = [*DOCS.glob("images/*.png"), *DOCS.glob("images/*.webp")]
+    assert linked == {*images, *machines}
 
 
 def test_pictures_are_small():
     sizes = [path.stat().st_size for path in (ROOT / "docs" / "images").glob("*.png")]
     assert sum(sizes) < 3.5e6
+    assert all(film.stat().st_size < 1.5e5 for film in DOCS.glob("images/*.webp"))
     machines = (ROOT / "assets/machines").glob("*/picture.png")
     assert max(path.stat().st_size for path in machines) < 2e5
 

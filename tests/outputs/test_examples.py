@@ -15,6 +15,7 @@ WRITES = {
     "exports": ("dvf5000_first.glb", "dvf5000_first.vts", "dvf5000_first.csv"),
     "design_review": ("review.pdf",),
     "animation": ("bend.webp",),
+    "acceptance": ("acceptance.png", "acceptance.webp"),
 }
 SCRIPTS = sorted(p.stem for p in EXAMPLES.glob("*.py") if "write_figure(" in p.read_text("utf-8"))
 

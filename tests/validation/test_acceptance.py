@@ -1,5 +1,9 @@
-"""Machines that pass tests: an independent model, closed forms, a blind spot, sampled machines."""
+"""Machines that pass tests: an independent model, closed forms, a blind spot, sampled machines.
 
+The numbers of docs/acceptance.md are checked here, too.
+"""
+
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,10 +11,11 @@ import pytest
 from scipy.optimize import linprog
 
 import warpspace
+from doc_pages import DOCS, blocks
 from warpspace.acceptance.acceptance import Acceptance, find_worst_machine
 from warpspace.acceptance.error_curves import ErrorCurves
 from warpspace.acceptance.next_tests import build_constraint
-from warpspace.acceptance.plans import parse_plan
+from warpspace.acceptance.plans import load_plan, parse_plan
 from warpspace.bench.base import run_test
 from warpspace.scene.library import load_scene
 
@@ -335,3 +340,72 @@ def test_more_tolerance_gives_no_smaller_error(tmp_path):
     entries = plan_of(scene, CIRCLES)
     narrow, wide = (find_worst_machine(each, entries) for each in (scene, wider))
     assert wide.bound_um[1] >= narrow.bound_um[0]
+
+
+PAGE = (DOCS / "acceptance.md").read_text("utf-8")
+WORDS = " ".join(PAGE.split())
+
+
+def table(heading):
+    """Give the numbers of each row, µm."""
+    rows = PAGE.split(f"| {heading} |", 1)[1].split("\n\n", 1)[0].splitlines()[2:]
+    return [[int(um) for um in re.findall(r"(\d+) µm(?= \|)", row)] for row in rows]
+
+
+@pytest.fixture
+def middle():
+    (text,) = blocks(PAGE, "toml")
+    assert text == "[view]\nreference = { X = 0, Y = 0, Z = -280 }\n"
+    return replace(load_scene("dvf5000_first"), reference={"X": 0.0, "Y": 0.0, "Z": -280.0})
+
+
+def test_table_of_the_machine_with_three_axes(tmp_path):
+    scene, tests = scene_of(tmp_path), CIRCLES + LINES + DIAGONALS
+    bounds = [find_worst_machine(scene, plan_of(scene, tests[:n])).bound_um for n in (0, 3, 12, 13)]
+    assert [row[-1] for row in table("machine with three axes passes")] == [
+        round(low) for low, _ in bounds
+    ]
+
+
+def test_circles_within_1_um_exclude_nothing(tmp_path):
+    scene = scene_of(tmp_path)
+    sharp = [entry.replace("limit_um = 8", "limit_um = 1") for entry in CIRCLES]
+    result = find_worst_machine(scene, plan_of(scene, sharp))
+    assert round(result.bound_um[0]) == 156
+    corner, inside = np.array([result.at["X"]]), np.linspace(-100.0, 100.0, 9)
+    errors, sign = result.machine.errors, np.sign(result.errors["EC0Y"])
+    assert sign * result.errors["EC0Y"] == pytest.approx(25.0)
+    assert sign * errors.evaluate("EXX", inside) == pytest.approx(np.full(9, -10.0), abs=0.5)
+    assert sign * errors.evaluate("EXX", corner) == pytest.approx([10.0])
+    yaw = sign * errors.evaluate("ECX", inside)
+    assert (round(yaw.min()), round(yaw.max())) == (-20, -15)
+    assert sign * errors.evaluate("ECX", corner) == pytest.approx([20.0])
+
+
+@pytest.mark.nightly
+def test_table_of_the_dvf5000(middle):
+    first, tests = load_scene("dvf5000_first"), load_plan("iso_5_axes_bc", middle)
+    rows = table("DVF5000 passes")
+    for count, row in zip((0, 3, 12, 13, 15, 16), rows, strict=True):
+        results = [find_worst_machine(scene, tests[:count]) for scene in (first, middle)]
+        assert row == [round(result.bound_um[0]) for result in results], count
+        if count == 13:
+            errors = results[0].errors
+            assert [errors[key] for key in ("EAX", "EAY", "ECY")] == pytest.approx([-20, -20, 20])
+            travel = np.linspace(-225.0, 225.0, 5)
+            assert np.ptp(results[0].machine.errors.evaluate("EAY", travel)) < 1e-6
+        if count == 16:
+            errors = results[1].errors
+            assert [abs(errors[key]) for key in ("EA0B", "EA0C")] == pytest.approx([25.0, 25.0])
+
+
+@pytest.mark.nightly
+def test_slopes_and_factors(middle):
+    tests = load_plan("iso_3_axes", middle)
+    for slope, um in ((50.0, 141), (20.0, 102)):
+        assert f"{um} µm" in WORDS
+        result = find_worst_machine(middle, tests, Acceptance(slope=slope))
+        assert round(result.bound_um[0]) == um
+    assert "with 0.375 × all limits, no machine that passes exceeds 150 µm" in WORDS
+    assert find_worst_machine(middle, tests, Acceptance(keep_um=150.0)).factor == 0.375
+    assert find_worst_machine(middle, tests, Acceptance(keep_um=100.0)).factor is None
