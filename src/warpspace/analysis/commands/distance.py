@@ -168,5 +168,5 @@ class DistanceResult(Result):
             yield f"angle at {place_words(self.at[2])}: {nominal:.6f}° → {actual:.6f}°"
             yield (
                 f"  {kind} of the edge to {end} against the edge to {start}:"
-                f" {spell_change(self.deviation_urad)} µrad{angle}; positive is wider"
+                f" {spell_change(self.deviation_urad or 0.0)} µrad{angle}; positive is wider"
             )

@@ -124,7 +124,7 @@
       if (p.depth <= 0) continue;
       const long = Math.hypot(p.x - foot.x, p.y - foot.y);
       const [u, v] = long > 1 ? [(p.x - foot.x) / long, (p.y - foot.y) / long] : [0, 1];
-      const w = widthOf(text, kind === "axis") - 6, h = 15;
+      const w = widthOf(text, kind === "axis") - 6, h = 15.6;
       const reach = Math.abs(u) * w / 2 + Math.abs(v) * h / 2;
       const away = 3 + reach + (kind === "axis" ? beyond.get(axis) ?? 0 : 0);
       if (kind === "tick") beyond.set(axis, Math.max(beyond.get(axis) ?? 0, 2 * reach + 2));
