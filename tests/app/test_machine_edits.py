@@ -271,7 +271,7 @@ def test_traces_are_drawn_in_numbers_where_an_error_moves_them():
     state = with_curve(STATE, "EZC", rising)
     text = body_of(machine_editor.RotarySection, state)
     assert text.count("<svg") == 3
-    assert "8.00 µm" in text
+    assert "8.0 µm" in text
     located = with_curve(STATE, "EX0C", Constant(rising.span, 6.0))
     text = body_of(machine_editor.RotarySection, located.with_amplitude("EA0C", 20.0))
     for head, unit in (("displaced", "µm"), ("inclined", "µrad"), ("radial", "µm")):

@@ -31,7 +31,7 @@ Plan: TypeAlias = Annotated[str | None, Grammar("PLAN", typed_word, is_file=True
 
 @dataclass(frozen=True, kw_only=True)
 class Acceptance(Analysis):
-    """Find the largest error of a machine that passes a plan of tests.
+    """Find the worst machine that passes its acceptance tests.
 
     Considers all machines within the tolerances of SCENE: each error is an arbitrary curve, linear
     between its knots. PLAN lists tests of the bench with limits ([[acceptance]] test = "circular",

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from markupsafe import escape
 
-from warpspace.units import MICROMETRE, MICRORADIAN
-
 if TYPE_CHECKING:
     from warpspace.units import Array
 
@@ -45,7 +43,7 @@ class Column:
     @property
     def rounded(self) -> "Column":
         """The column on pages, where errors have one decimal; tables of commands have two."""
-        is_error = self.unit in (MICROMETRE, MICRORADIAN) and self.form in (".2f", "+.2f")
+        is_error = self.unit in ("µm", "µrad") and self.form in (".2f", "+.2f")
         return replace(self, form=str(self.form).replace("2", "1")) if is_error else self
 
     def spell(self, value: Any) -> str:

@@ -81,7 +81,7 @@ _BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
     ("allocate", "design", "analysis.commands.allocate:Allocate",
      "Find the widest tolerances that meet a limit of |E|."),
     ("acceptance", "design", "acceptance.acceptance:Acceptance",
-     "Find the largest error of a machine that passes a plan of tests."),
+     "Find the worst machine that passes its acceptance tests."),
     ("concepts", "design", "analysis.commands.concepts:Concepts",
      "Compare machines before one of them is built."),
     ("contributions", "design", "analysis.commands.contributions:Contributions",
