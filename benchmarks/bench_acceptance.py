@@ -5,8 +5,8 @@ from table import Growth, Row, Section
 from timing import best, python
 
 import warpspace
-from warpspace.acceptance.acceptance import Acceptance, find_worst_machine
-from warpspace.acceptance.plans import load_plan
+from warpspace.acceptance_tests.acceptance import Acceptance, find_worst_machine
+from warpspace.acceptance_tests.plans import load_plan
 
 KNOTS = (2, 3, 5, 9)
 PLAN = "iso_5_axes_bc"

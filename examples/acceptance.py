@@ -18,8 +18,8 @@ import numpy as np
 from PIL import Image
 
 import warpspace
-from warpspace.acceptance.acceptance import find_worst_machine
-from warpspace.acceptance.plans import PlannedTest, load_plan
+from warpspace.acceptance_tests.acceptance import find_worst_machine
+from warpspace.acceptance_tests.plans import PlannedTest, load_plan
 from warpspace.outputs.drawing.map3d import GHOST_DASHES, Stage, draw_map, fit_map
 from warpspace.outputs.drawing.settings import SAVE_RC, SIZES, FigureSettings, evaluate_for
 from warpspace.outputs.drawing.sheet import line_entry, start_sheet

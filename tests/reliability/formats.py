@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from warpspace.acceptance.plans import load_plan
+from warpspace.acceptance_tests.plans import load_plan
 from warpspace.app.documents.transfers import unpack, upload_text
 from warpspace.bench.base import find_test, run_test
 from warpspace.calibration import read_readings

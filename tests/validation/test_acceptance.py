@@ -12,10 +12,10 @@ from scipy.optimize import linprog
 
 import warpspace
 from doc_pages import DOCS, blocks
-from warpspace.acceptance.acceptance import Acceptance, find_worst_machine
-from warpspace.acceptance.error_curves import ErrorCurves
-from warpspace.acceptance.next_tests import build_constraint
-from warpspace.acceptance.plans import load_plan, parse_plan
+from warpspace.acceptance_tests.acceptance import Acceptance, find_worst_machine
+from warpspace.acceptance_tests.error_curves import ErrorCurves
+from warpspace.acceptance_tests.next_tests import build_constraint
+from warpspace.acceptance_tests.plans import load_plan, parse_plan
 from warpspace.bench.base import run_test
 from warpspace.scene.library import load_scene
 

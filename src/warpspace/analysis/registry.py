@@ -80,7 +80,7 @@ _BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
      "Sample machines within tolerance: distribution of |E|."),
     ("allocate", "design", "analysis.commands.allocate:Allocate",
      "Find the widest tolerances that meet a limit of |E|."),
-    ("acceptance", "design", "acceptance.acceptance:Acceptance",
+    ("acceptance", "design", "acceptance_tests.acceptance:Acceptance",
      "Find the worst machine that passes its acceptance tests."),
     ("concepts", "design", "analysis.commands.concepts:Concepts",
      "Compare machines before one of them is built."),

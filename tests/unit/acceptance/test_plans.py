@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from warpspace.acceptance.acceptance import Acceptance, find_worst_machine
-from warpspace.acceptance.plans import default_plan, load_plan, parse_plan, plan_names
-from warpspace.acceptance.polytope import cone_bound, icosahedron
+import warpspace
+from warpspace.acceptance_tests.acceptance import Acceptance, find_worst_machine
+from warpspace.acceptance_tests.plans import default_plan, load_plan, parse_plan, plan_names
+from warpspace.acceptance_tests.polytope import cone_bound, icosahedron
 from warpspace.analysis.description import ignore_progress
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.machine.errors import Tolerance, ToleranceSet
@@ -210,3 +211,9 @@ def test_cone_bound_covers_random_vectors():
         linear = units @ np.linalg.solve(corners, heights)
         assert longest.max() <= bound * (1.0 + 1e-12)
         assert linear.max() == pytest.approx(bound, rel=0.01)
+
+
+def test_the_function_of_the_package_can_be_called_again():
+    scene = warpspace.load_scene("machine_c_frame_mill")
+    bounds = [warpspace.acceptance(scene, knots=2).bound_um for _ in range(2)]
+    assert bounds[0] == bounds[1]

@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from dataclasses import dataclass, fields, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -178,6 +179,11 @@ def test_a_stop_is_heeded(entry):
         small(entry.load()).run(scene_of(entry.name), stop)
     except StoppedError:
         assert 0.0 <= shares[0] <= 1.0
+
+
+@EVERY
+def test_no_package_hides_the_function_of_an_analysis(entry):
+    assert find_spec(f"warpspace.{entry.name.replace('-', '_')}") is None
 
 
 def test_importing_every_analysis_imports_nothing_heavy():

@@ -10,8 +10,8 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.acceptance.acceptance import Acceptance
-from warpspace.acceptance.plans import default_plan, load_plan
+from warpspace.acceptance_tests.acceptance import Acceptance
+from warpspace.acceptance_tests.plans import default_plan, load_plan
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import TEST, option_values, read_form

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from warpspace.acceptance.plans import default_plan, parse_plan, plan_names
+from warpspace.acceptance_tests.plans import default_plan, parse_plan, plan_names
 from warpspace.analysis.blocks import Histogram
 from warpspace.analysis.description import Result
 from warpspace.analysis.loop_parameters import loop_keys

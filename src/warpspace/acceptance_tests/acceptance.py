@@ -6,10 +6,10 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from warpspace.acceptance.error_curves import ErrorCurves
-from warpspace.acceptance.next_tests import NextTest, build_constraint, find_next_tests
-from warpspace.acceptance.plans import UNITS, PlannedTest, default_plan, load_plan, plan_names
-from warpspace.acceptance.polytope import Constraint, InfeasibleError, LargestError
+from warpspace.acceptance_tests.error_curves import ErrorCurves
+from warpspace.acceptance_tests.next_tests import NextTest, build_constraint, find_next_tests
+from warpspace.acceptance_tests.plans import UNITS, PlannedTest, default_plan, load_plan, plan_names
+from warpspace.acceptance_tests.polytope import Constraint, InfeasibleError, LargestError
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import NO_JSON, Analysis, Change, ProgressCallback, Result
 from warpspace.analysis.options import Grammar, option, place_words, typed_word

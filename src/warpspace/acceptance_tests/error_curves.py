@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from warpspace.acceptance.polytope import (
+from warpspace.acceptance_tests.polytope import (
     Constraint,
     LargestError,
     Polytope,

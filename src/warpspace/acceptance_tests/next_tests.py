@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from warpspace.acceptance.error_curves import ErrorCurves
-from warpspace.acceptance.plans import UNITS, PlannedTest
-from warpspace.acceptance.polytope import (
+from warpspace.acceptance_tests.error_curves import ErrorCurves
+from warpspace.acceptance_tests.plans import UNITS, PlannedTest
+from warpspace.acceptance_tests.polytope import (
     Constraint,
     InfeasibleError,
     LargestError,
