@@ -278,8 +278,7 @@ def _program_frame(
 
 
 def _box_corners(points_mm: Array) -> Array:
-    x, y, z = np.stack([points_mm.min(axis=0), points_mm.max(axis=0)], -1)
-    return np.stack(np.meshgrid(x, y, z), -1).reshape(-1, 3)
+    return _corners(points_mm.min(axis=0), points_mm.max(axis=0))
 
 
 def _swept(part: PlacedBody) -> Array:
@@ -287,8 +286,12 @@ def _swept(part: PlacedBody) -> Array:
     low, high = points.min(axis=0), points.max(axis=0)
     middle = (low + high) / 2.0
     reach = float(np.linalg.norm((points - middle)[:, :2], axis=1).max())
-    ends = ([middle[0] - reach, middle[0] + reach], [middle[1] - reach, middle[1] + reach])
-    return np.stack(np.meshgrid(*ends, [low[2], high[2]]), -1).reshape(-1, 3)
+    low[:2], high[:2] = middle[:2] - reach, middle[:2] + reach
+    return _corners(low, high)
+
+
+def _corners(low: Array, high: Array) -> Array:
+    return np.stack(np.meshgrid(*np.stack([low, high], -1)), -1).reshape(-1, 3)
 
 
 ENDINGS = (".gif", ".webp", ".mp4")

@@ -40,8 +40,7 @@ class FittedLine:
 
 def fit_lines(position_mm: Array, readings_um: Array) -> tuple[Array, Array, dict[str, FittedLine]]:
     """Compute the mean reading at each position, [p] twice, and its three reference lines."""
-    x, index = np.unique(np.round(position_mm, 6), return_inverse=True)
-    mean = np.bincount(index.reshape(-1), readings_um) / np.bincount(index.reshape(-1))
+    x, mean = mean_by(position_mm, readings_um)
     lines: dict[str, FittedLine] = {}
     for name in REFERENCES:
         offset, slope = fit_line(x, mean, name.replace("points", "point"))
