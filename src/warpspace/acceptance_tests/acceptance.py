@@ -7,6 +7,7 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 import numpy as np
 
 from warpspace.acceptance_tests.error_curves import ErrorCurves
+from warpspace.acceptance_tests.measurands import Measurand, PartModel, find_largest_deviations
 from warpspace.acceptance_tests.next_tests import NextTest, build_constraint, find_next_tests
 from warpspace.acceptance_tests.plans import UNITS, PlannedTest, default_plan, load_plan, plan_names
 from warpspace.acceptance_tests.polytope import Constraint, InfeasibleError, LargestError
@@ -19,7 +20,7 @@ from warpspace.field.evaluate import compare_orders, evaluate_field
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import LIMIT_UM
 from warpspace.scene.model import Scene
-from warpspace.units import Array
+from warpspace.units import Array, spell_signed
 
 KNOTS = (2, 21)
 MAX_NEXT = 10
@@ -80,6 +81,10 @@ class Acceptance(Analysis):
         flag="--keep",
     )
 
+    part: bool = option(
+        False, "Also find the largest deviation of each measurand of the part of SCENE"
+    )
+
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "AcceptanceResult":
         tests = load_plan(self.plan or default_plan(scene), scene)
         return find_worst_machine(scene, tests, self, watch)
@@ -111,11 +116,14 @@ class AcceptanceResult(Result):
     contributions_um: Mapping[str, float]  # along the direction, the largest first
     next: tuple[NextTest, ...] = ()  # each added to the tests before it
     keep_um: float | None = None
+    measurands: tuple[Measurand, ...] = ()  # of the part of the scene
+    part_remarks: tuple[str, ...] = field(default=(), metadata=NO_JSON)
     factor: float | None = None  # for all limits, so that |E| ≤ keep_um; None if there is none
 
     def json_fields(self) -> dict[str, Any]:
         document = super().json_fields() | {"tests": [test._asdict() for test in self.tests]}
         unused = {"next"} if not self.next else set[str]()
+        unused |= {"measurands"} if not self.measurands else set[str]()
         unused |= {"keep_um", "factor"} if self.keep_um is None else set[str]()
         return {key: value for key, value in document.items() if key not in unused}
 
@@ -162,6 +170,8 @@ class AcceptanceResult(Result):
             ],
             title="Errors responsible",
         )
+        if self.measurands:
+            yield _measurands_table(self.measurands)
         if self.keep_um is not None and self.factor is None:
             yield f"  no limits of these tests keep |E| ≤ {self.keep_um:g} µm everywhere"
         elif self.keep_um is not None:
@@ -179,10 +189,35 @@ class AcceptanceResult(Result):
 
     def caveats(self) -> Iterator[str]:
         yield from super().caveats()
+        yield from self.part_remarks
         axes = ErrorCurves(self.scene, self.knots).curved_axes
         if axes:
             count = 2 * self.knots - 1
             yield f"|E| is evaluated at {count} positions only along {', '.join(axes)}"
+
+
+def _measurands_table(measurands: Sequence[Measurand]) -> Table:
+    units = {"um": "µm", "urad": "µrad"}
+    return Table(
+        (
+            Column("measurand", leads=True, wraps=True),
+            Column("largest deviation", ".2f"),
+            Column("at most", ".2f"),
+            Column("without tests", ".2f"),
+            Column("unit"),
+            Column("tolerance"),
+            Column("verdict"),
+        ),
+        [
+            (
+                f"{each.name} · {each.measure.replace('_', ' ')}", *each.bound, each.without_tests,
+                units[each.unit], " … ".join(map(spell_signed, each.tolerance or ())),
+                each.verdict,
+            )
+            for each in measurands
+        ],
+        title="Measurands of the part",
+    )  # fmt: skip
 
 
 def find_worst_machine(
@@ -199,7 +234,7 @@ def find_worst_machine(
     tests : sequence of PlannedTest
         Empty for all machines within tolerance.
     request : Acceptance, optional
-        Knots and slope.
+        Its options except for the plan.
     watch : callable, optional
 
     Returns
@@ -209,12 +244,14 @@ def find_worst_machine(
     Raises
     ------
     OptionError
-        If a tolerance is missing, the machine cannot run a test, or no machine passes.
+        If a tolerance is missing, the machine cannot run a test, no machine passes, or there is no
+        part.
     """
     request = request or Acceptance()
     curves = ErrorCurves(scene, request.knots, request.slope)
     constraints = [build_constraint(curves, planned, watch) for planned in tests]
-    plain = not (request.next_count or request.keep_um)
+    part = PartModel(curves, watch) if request.part else None
+    plain = not (request.next_count or request.keep_um or part)
     without = curves.find_largest((), lambda part: watch(0.1 * part))
     try:
         worst = curves.find_largest(
@@ -225,6 +262,12 @@ def find_worst_machine(
         verb = "cannot be passed" if len(names) == 1 else "exclude each other"
         raise OptionError(f"{error}: {', '.join(names)} {verb}") from None
     report = _report(curves, worst, without.low_um, list(zip(tests, constraints, strict=True)))
+    if part is not None:
+        step = 0.3 if request.next_count or request.keep_um else 0.7
+        measurands = find_largest_deviations(
+            curves, constraints, part, lambda share: watch(0.3 + step * share)
+        )
+        report = replace(report, measurands=tuple(measurands), part_remarks=tuple(part.remarks()))
     if request.keep_um is not None:
         factor = find_factor(curves, constraints, worst, request.keep_um, watch)
         report = replace(report, keep_um=request.keep_um, factor=factor)

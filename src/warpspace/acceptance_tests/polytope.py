@@ -93,8 +93,7 @@ class Polytope:
         padded = np.append(cost, np.zeros(width - count))
         self._solver.changeColsCost(width, np.arange(width, dtype=np.int32), padded)
         while True:
-            self._solver.run()
-            if self._solver.getModelStatus() != highspy.HighsModelStatus.kOptimal:
+            if not self._solve() and not self._solve(anew=True):
                 raise InfeasibleError("no machine within the tolerances passes all tests")
             solution = self._solver.getSolution()
             point = np.array(solution.col_value)
@@ -106,6 +105,13 @@ class Polytope:
         dual = np.array(solution.row_dual)
         gradient = dual @ self._rows[self._added, :count]
         return Vertex(point[:count], float(cost @ point[:count]), gradient, np.abs(dual).sum())
+
+    def _solve(self, anew: bool = False) -> bool:
+        """Run the solver; anew where the basis of the solution before leads nowhere."""
+        if anew:
+            self._solver.clearSolver()
+        self._solver.run()
+        return self._solver.getModelStatus() == highspy.HighsModelStatus.kOptimal
 
     def bounds(self, costs: Array, proofs: Sequence[Vertex] = ()) -> Array:
         """Compute upper bounds of functionals, [..., V], from the box and proofs of others."""

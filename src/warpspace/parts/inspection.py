@@ -63,6 +63,7 @@ SCAN_VERTICES = 24  # of a surface, at least: fewer lie near many shapes
 SIMPLER = 1.1  # ratio of residuals up to which the simpler shape is chosen
 MAX_FEATURES = 500  # the largest surfaces of a mesh; smaller ones are ignored
 RIGHT_RAD = 1e-4  # tolerance of nominal angles of 90° or 0, and of what datums fix
+SMALL_MM, SMALL_RAD = 1.0, 0.01  # distances and angles of which changes are not linear
 STEP_SHARE = 1e-4  # step of difference quotients, as a share of an error
 LEVER_MM = 100.0  # weight of rotations against translations that datums leave free
 SHAPES = "plane", "cylinder", "cone", "sphere"  # in the order of trials
@@ -117,7 +118,12 @@ class ShapeMotion(NamedTuple):
     turn_rad: Array  # [F, 3]
     radius_mm: Array  # [F]
     angle_rad: Array  # [F]
-    form_mm: Array  # [F], span of the distances of its points
+    distance_mm: Array  # [F, n], of its points
+
+    @property
+    def form_mm(self) -> Array:
+        """Span of the distances of its points, [F]."""
+        return np.ptp(self.distance_mm, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,8 +166,8 @@ class Feature:
         if self.fit != schema.LEAST_SQUARES:
             step = np.array([fit_extreme(design, distance, self.fit) for distance in away])
         radius, angle = self.shape.radius_mm + step[:, 6], self.shape.angle_rad + step[:, 7]
-        form = np.ptp(away + step @ design.T, axis=1)
-        return ShapeMotion(self.shape, mean + step[:, :3], step[:, 3:6], radius, angle, form)
+        distance = away + step @ design.T
+        return ShapeMotion(self.shape, mean + step[:, :3], step[:, 3:6], radius, angle, distance)
 
 
 def fit_shape(start: FeatureShape, point_mm: Array, shares: Array | None = None) -> FeatureShape:
@@ -321,28 +327,40 @@ def _weigh_vertices(mesh: Workpiece, rows: NDArray[np.intp]) -> tuple[NDArray[np
     return vertices, shares / shares.sum()
 
 
-def _distance(feature: ShapeMotion, datum: ShapeMotion) -> Array:
-    """Compute the distance normal to a plane, else to an axis, else between centres."""
+def _separation(feature: ShapeMotion, datum: ShapeMotion) -> Array:
+    """Compute the distance normal to a plane, else to an axis, else between centres, [F, 3]."""
     fixing = min(datum, feature, key=lambda motion: SHAPES.index(motion.shape.kind))
     away = feature.shape.centre_mm - datum.shape.centre_mm
     moved = feature.shift_mm - datum.shift_mm - np.cross(fixing.turn_rad, away)
-    return np.linalg.norm((away + moved) @ fixing.shape.across, axis=1)
+    return (away + moved) @ fixing.shape.across
 
 
-def _angle(feature: ShapeMotion, datum: ShapeMotion) -> Array:
-    """Compute the angle through the material between planes, else up to 90°."""
-    axis, planes = feature.shape.axis, [feature.shape.kind, datum.shape.kind].count("plane")
+def _angle_offset(feature: ShapeMotion, datum: ShapeMotion) -> float:
+    """Compute the angle, through the material between planes, of parallel axes."""
+    planes = [feature.shape.kind, datum.shape.kind].count("plane")
+    is_opposite = feature.shape.axis @ datum.shape.axis < -RIGHT_RAD
+    return np.pi / 2.0 if planes == 1 else np.pi if planes and not is_opposite else 0.0
+
+
+def _turn_between(feature: ShapeMotion, datum: ShapeMotion) -> Array:
+    """Compute the rotation from an axis to that of a datum, up to 90°, [F, 3]."""
+    axis = feature.shape.axis
     same = -1.0 if axis @ datum.shape.axis < -RIGHT_RAD else 1.0
     about = np.cross(axis, same * datum.shape.axis)
     sine = np.linalg.norm(about)
     start = about * np.arctan2(sine, same * axis @ datum.shape.axis) / (sine or 1.0)
     turned = datum.turn_rad - feature.turn_rad
-    offset = np.pi / 2.0 if planes == 1 else np.pi if planes and same > 0.0 else 0.0
-    return np.abs(offset - np.linalg.norm(start + turned - np.outer(turned @ axis, axis), axis=1))
+    return start + turned - np.outer(turned @ axis, axis)
 
 
-def _position(feature: ShapeMotion, *datums: ShapeMotion) -> Array:
-    """Compute the deviation of a feature from its nominal position against datums.
+def _angle(feature: ShapeMotion, datum: ShapeMotion) -> Array:
+    """Compute the angle through the material between planes, else up to 90°."""
+    turn = np.linalg.norm(_turn_between(feature, datum), axis=1)
+    return np.abs(_angle_offset(feature, datum) - turn)
+
+
+def _displacement(feature: ShapeMotion, *datums: ShapeMotion) -> Array:
+    """Compute the deviation of a feature from its nominal position against datums, [F, 3].
 
     Each datum fixes degrees of freedom that the previous ones leave free; the best fit determines
     those that none fixes.
@@ -359,7 +377,11 @@ def _position(feature: ShapeMotion, *datums: ShapeMotion) -> Array:
         fixing = free @ rigid @ fixed
         inverse = pinv(fixing, atol=RIGHT_RAD) @ free
         motion, free = motion + difference @ inverse, free - fixing @ inverse
-    return np.linalg.norm((feature.shift_mm - motion[..., :3]) @ feature.shape.across, axis=1)
+    return (feature.shift_mm - motion[..., :3]) @ feature.shape.across
+
+
+def _norm_of(vectors: Callable[..., Array]) -> Callable[..., Array]:
+    return lambda *motions: np.linalg.norm(vectors(*motions), axis=1)
 
 
 class MeasureKind(NamedTuple):
@@ -369,6 +391,9 @@ class MeasureKind(NamedTuple):
     features: Sequence[str]
     datum_count: tuple[int, int] = (0, 0)
     is_angle: bool = False
+    # linear in the displacements, [F, r]: a number, a vector whose norm, or distances whose span
+    # is the measure
+    vectors: Callable[..., Array] = lambda shape: shape.distance_mm
 
 
 KINDS: Mapping[str, MeasureKind] = {
@@ -376,13 +401,22 @@ KINDS: Mapping[str, MeasureKind] = {
     "cylindricity": MeasureKind(lambda shape: shape.form_mm, ["cylinder"]),
     "conicity": MeasureKind(lambda shape: shape.form_mm, ["cone"]),
     "sphericity": MeasureKind(lambda shape: shape.form_mm, ["sphere"]),
-    "diameter": MeasureKind(lambda shape: 2.0 * shape.radius_mm, ["cylinder", "sphere"]),
-    "half_angle": MeasureKind(lambda shape: shape.angle_rad, ["cone"], is_angle=True),
-    "position": MeasureKind(_position, SHAPES, (0, 6)),
-    "distance": MeasureKind(_distance, SHAPES, (1, 1)),
-    "angle": MeasureKind(_angle, SHAPES[:3], (1, 1), is_angle=True),
-    "squareness": MeasureKind(_angle, SHAPES[:3], (1, 1), is_angle=True),
-    "parallelism": MeasureKind(_angle, SHAPES[:3], (1, 1), is_angle=True),
+    "diameter": MeasureKind(
+        lambda shape: 2.0 * shape.radius_mm,
+        ["cylinder", "sphere"],
+        vectors=lambda shape: 2.0 * shape.radius_mm[:, None],
+    ),
+    "half_angle": MeasureKind(
+        lambda shape: shape.angle_rad,
+        ["cone"],
+        is_angle=True,
+        vectors=lambda shape: shape.angle_rad[:, None],
+    ),
+    "position": MeasureKind(_norm_of(_displacement), SHAPES, (0, 6), vectors=_displacement),
+    "distance": MeasureKind(_norm_of(_separation), SHAPES, (1, 1), vectors=_separation),
+    "angle": MeasureKind(_angle, SHAPES[:3], (1, 1), is_angle=True, vectors=_turn_between),
+    "squareness": MeasureKind(_angle, SHAPES[:3], (1, 1), is_angle=True, vectors=_turn_between),
+    "parallelism": MeasureKind(_angle, SHAPES[:3], (1, 1), is_angle=True, vectors=_turn_between),
 }
 Band: TypeAlias = tuple[float, float] | None  # a tolerance, µm or µrad
 MeasureKey: TypeAlias = tuple[str, tuple[int, ...]]  # its kind, and numbers of features
@@ -417,19 +451,14 @@ def inspect(
     largest deviation of errors between evaluated points. `tolerances` are the name and the text of
     a TOML file of features; a SceneError lists its problems.
     """
-    by_name, points = find_features(mesh, noise_um), mesh.vertices_mm
-    names, features = [*by_name], [*by_name.values()]
-    bands: MeasureBands = {
-        (kind, (at,)): None
-        for at, feature in enumerate(features)
-        for kind, row in KINDS.items()
-        if feature.shape.kind in row.features and not row.datum_count[0]
-    }
-    if tolerances:
-        bands |= _read_tolerances(*tolerances, features, names)
+    points = mesh.vertices_mm
+    names, features, bands = read_measures(mesh, tolerances, noise_um)
     if not bands:
         return ()
-    turn, evaluate_measures = _rotation(mesh, actual), partial(_evaluate_measures, features, bands)
+    turn, evaluate_measures = (
+        mesh_rotation(mesh, actual),
+        partial(_evaluate_measures, features, bands),
+    )
     fit = partial(subtract_best_fit, points, shares=mesh.shares)
     errors = [actual.error_um]
     if any(bands.values()):
@@ -454,10 +483,9 @@ def inspect(
         )
     measures = [dict[str, Mapping[str, Any]]() for _ in features]
     for index, ((kind, of), band) in enumerate(bands.items()):
-        to = f" to {', '.join(names[at] for at in of[1:])}" if of[1:] else ""
         split = {key: float(part[index]) for key, part in budget.items()}
         stated = (uncertainty.errors, u95[index]) if uncertainty else None
-        measures[of[0]][kind + to] = _measure_numbers(
+        measures[of[0]][spell_measure((kind, of), names)] = _measure_numbers(
             KINDS[kind], values[:, index], band, split, stated, interpolation_um
         )
     results: list[FeatureResult] = []
@@ -468,6 +496,78 @@ def inspect(
         )
         results.append(result)
     return tuple(results)
+
+
+def read_measures(
+    mesh: Workpiece, tolerances: tuple[str, str] | None, noise_um: float = SCAN_NOISE_UM
+) -> tuple[list[str], list[Feature], MeasureBands]:
+    """Find the features of a mesh, their names and their measures, with tolerances if stated."""
+    by_name = find_features(mesh, noise_um)
+    names, features = [*by_name], [*by_name.values()]
+    bands: MeasureBands = {
+        (kind, (at,)): None
+        for at, feature in enumerate(features)
+        for kind, row in KINDS.items()
+        if feature.shape.kind in row.features and not row.datum_count[0]
+    }
+    if tolerances:
+        bands |= _read_tolerances(*tolerances, features, names)
+    return names, features, bands
+
+
+def spell_measure(measure: MeasureKey, names: Sequence[str]) -> str:
+    kind, (_, *datums) = measure
+    return f"{kind} to {', '.join(names[at] for at in datums)}" if datums else kind
+
+
+class LinearMeasure(NamedTuple):
+    """A measure to first order in K small displacements: its deviation, µm or µrad.
+
+    Of one row the number rows · v; of three their norm, of more their span about `start`, both
+    times the sign.
+    """
+
+    rows: Array  # [r, K]
+    start: Array  # [r]; residuals of a scan, 0 of a nominal mesh
+    sign: float  # of deviations that have only one, else 0
+
+
+def linearise_measures(
+    features: Sequence[Feature], measures: Collection[MeasureKey], move_um: Array
+) -> list[LinearMeasure | None]:
+    """Compute the response of measures to displacements, [K, n, 3], in the frame of the mesh.
+
+    None where a measure is not linear: where a fit is not by least squares, or where a nominal
+    distance or angle is so small, but not zero, that its direction changes.
+    """
+    moves = np.concatenate([0.0 * move_um[:1], move_um])
+    is_linear = [feature.fit == schema.LEAST_SQUARES for feature in features]
+    used = {at for _, of in measures for at in of if is_linear[at]}
+    motions = {at: features[at].follow(moves) for at in used}
+    return [
+        _linearise(kind, [motions[at] for at in of]) if used.issuperset(of) else None
+        for kind, of in measures
+    ]
+
+
+def _linearise(name: str, motions: Sequence[ShapeMotion]) -> LinearMeasure | None:
+    kind = KINDS[name]
+    unit = URAD_PER_RAD if kind.is_angle else UM_PER_MM
+    start, *moved = kind.vectors(*motions)
+    rows, size, sign = (np.array(moved) - start).T, float(np.linalg.norm(start)), 1.0
+    if len(rows) == 1:
+        return LinearMeasure(rows * unit, 0.0 * start, 0.0)
+    if kind.vectors not in (_displacement, _separation, _turn_between):
+        return LinearMeasure(rows * unit, start * unit, 1.0)
+    if kind.is_angle:
+        offset = _angle_offset(*motions)
+        sign = -1.0 if offset > size + RIGHT_RAD else 1.0
+    zero, small = (RIGHT_RAD, SMALL_RAD) if kind.is_angle else (AXIS_MM, SMALL_MM)
+    if size <= zero:
+        return LinearMeasure(rows * unit, np.zeros(3), sign)
+    along = sign * (start / size) @ rows[None] * unit
+    is_zero = kind.is_angle and abs(_angle_offset(*motions) - size) <= RIGHT_RAD
+    return LinearMeasure(along, np.zeros(1), float(is_zero)) if size > small else None
 
 
 def measure_changes(
@@ -481,14 +581,14 @@ def measure_changes(
     features = [*by_name.values()]
     bands = _read_tolerances(*tolerances, features, [*by_name])
     toleranced = [measure for measure, band in bands.items() if band]
-    moved = np.array([actual.error_um, *moves_um]) @ _rotation(mesh, actual)
+    moved = np.array([actual.error_um, *moves_um]) @ mesh_rotation(mesh, actual)
     present, *steps = subtract_best_fit(mesh.vertices_mm, moved, mesh.shares)
     moves = (present + sign * STEP_SHARE * np.array(steps) for sign in (-1.0, 1.0))
     low, high = (_evaluate_measures(features, toleranced, move) for move in moves)
     return (high - low) / (2.0 * STEP_SHARE)
 
 
-def _rotation(mesh: Workpiece, actual: ActualPoints) -> Array:
+def mesh_rotation(mesh: Workpiece, actual: ActualPoints) -> Array:
     """Compute the rotation from the frame of a mesh to the workpiece frame, [3, 3]."""
     from scipy.spatial.transform import Rotation
 
