@@ -271,3 +271,23 @@ def test_paths_of_the_tests_are_drawn_while_the_section_is_open():
     three = replace(state, page=PAGE, forms={"acceptance.plan": "iso_3_axes"})
     assert len(np.unique(LIVE.evaluate(three).bench.nominal_mm[:, 2].round(3))) > 10
     assert not linked_forms(replace(START, forms={"acceptance.plan": "x\n" * 1000}))
+
+
+def test_bounds_of_a_part_are_listed_on_request():
+    scene = load_scene("part_on_dvf5000")
+    (entry,) = (one for one in entries() if one.name == "acceptance")
+    forms = {
+        "acceptance.plan": PLAN.format(limit=8),
+        "acceptance.part": "1",
+        "acceptance.knots": "2",
+    }
+    state = replace(start_state(scene), page=PAGE, forms=forms)
+    alone = Alone(design.AcceptancePanel, state, entry)
+    assert "Measurands of the part" in section(alone.part, state)
+    ran(alone.part, state)
+    names = [each.name for each in alone.part.outcome.result.measurands]
+    assert names == ["side", "bore", "circle", "back"]
+    assert "back · squareness to side" in section(alone.part, state)
+    bare = replace(state, scene=START.scene)
+    ran(alone.part, bare)
+    assert "expected a scene whose [part] has a file" in section(alone.part, bare)

@@ -1,12 +1,10 @@
 """Bounds of measurands of a part: closed forms, sampled machines, the regular inspection."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
-from click.testing import CliRunner
 from trimesh import creation as make
 
 from warpspace.acceptance_tests.acceptance import Acceptance, find_worst_machine
@@ -21,7 +19,6 @@ from warpspace.acceptance_tests.plans import parse_plan
 from warpspace.acceptance_tests.polytope import Constraint, Polytope
 from warpspace.analysis.description import ignore_progress
 from warpspace.bench.linear_form import absolute
-from warpspace.cli.main import cli
 from warpspace.exceptions import OptionError
 from warpspace.parts.part import Part
 from warpspace.scene.library import load_scene
@@ -190,23 +187,6 @@ def test_remainders_are_those_of_points_outside_the_hull():
     remainders = find_remainders(points, np.arange(3))
     np.testing.assert_allclose(remainders[:5], [0.0, 0.0, 0.0, 0.0, 1.0], atol=1e-3)
     assert remainders[5] == pytest.approx(1.0, abs=1e-3)
-
-
-def test_json_and_refusals(tmp_path):
-    scene_of(tmp_path, SQUARENESS, FIRST + APART.format("0.1"))
-    (tmp_path / "plan.toml").write_text("[[acceptance]]\n" + CIRCLES[0], encoding="utf-8")
-    arguments = ["acceptance", str(tmp_path / "scene.toml"), str(tmp_path / "plan.toml"), "--json"]
-    assert "measurands" not in json.loads(CliRunner().invoke(cli, arguments).stdout)
-    (row,) = json.loads(CliRunner().invoke(cli, [*arguments, "--part"]).stdout)["measurands"]
-    assert list(row) == [
-        "name", "measure", "bound", "without_tests", "unit", "tolerance", "is_kept",
-    ]  # fmt: skip
-    assert (row["tolerance"], row["is_kept"]) == ([-0.1, 0.1], False)
-    refused = CliRunner().invoke(cli, ["acceptance", "dvf5000_first", "--part"])
-    assert refused.exit_code == 2
-    assert refused.stderr.strip() == (
-        "warpspace: --part: expected a scene whose [part] has a file"
-    )
 
 
 def test_cancelled_and_too_large(tmp_path, monkeypatch):

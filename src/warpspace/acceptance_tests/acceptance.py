@@ -82,7 +82,9 @@ class Acceptance(Analysis):
     )
 
     part: bool = option(
-        False, "Also find the largest deviation of each measurand of the part of SCENE"
+        False,
+        "Also find the largest deviation of each measurand of the part of SCENE",
+        label="Measurands of the part",
     )
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "AcceptanceResult":
