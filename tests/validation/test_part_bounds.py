@@ -1,5 +1,6 @@
 """Bounds of measurands of a part: closed forms, sampled machines, the regular inspection."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 import trimesh
 from trimesh import creation as make
 
+from doc_pages import DOCS
 from warpspace.acceptance_tests.acceptance import Acceptance, find_worst_machine
 from warpspace.acceptance_tests.error_curves import ErrorCurves
 from warpspace.acceptance_tests.measurands import (
@@ -15,7 +17,7 @@ from warpspace.acceptance_tests.measurands import (
     find_remainders,
 )
 from warpspace.acceptance_tests.next_tests import build_constraint
-from warpspace.acceptance_tests.plans import parse_plan
+from warpspace.acceptance_tests.plans import default_plan, load_plan, parse_plan
 from warpspace.acceptance_tests.polytope import Constraint, Polytope
 from warpspace.analysis.description import ignore_progress
 from warpspace.bench.linear_form import absolute
@@ -150,7 +152,9 @@ def test_all_measures_without_tolerances_and_a_wider_limit_gives_no_smaller_boun
     scene = scene_of(tmp_path, SQUARENESS)
     circle = 'test = "circular"\nplane = "XY"\nradius_mm = 100\nlimit_um = '
     narrow, wide = (
-        find_worst_machine(scene, plan_of(scene, [circle + um]), Acceptance(part=True)).measurands
+        find_worst_machine(
+            scene, plan_of(scene, [circle + um]), Acceptance(part=True, knots=2)
+        ).measurands
         for um in ("0.5", "1")
     )
     assert {(each.name, each.measure) for each in narrow} >= {
@@ -166,7 +170,7 @@ def test_a_minimum_zone_is_named_and_has_no_number(tmp_path):
     scene = scene_of(tmp_path, SQUARENESS, zone + FIRST + APART.format("5"))
     result = find_worst_machine(scene, (), Acceptance(part=True))
     assert [each.name for each in result.measurands] == ["second"]
-    assert "not linear in the errors, no bound: top · flatness" in [*result.caveats()]
+    assert "no bound, not linear in the errors: top · flatness" in [*result.caveats()]
 
 
 def test_span_of_the_corners_of_a_box_is_that_of_all_pairs():
@@ -174,9 +178,8 @@ def test_span_of_the_corners_of_a_box_is_that_of_all_pairs():
     rng = np.random.default_rng(2)
     rows = rng.normal(size=(60, 3))
     polytope = Polytope(-np.ones(3), np.ones(3), [Constraint("far", absolute(np.eye(3)), 1e3)])
-    start = rng.normal(size=60)
-    pairs = np.abs(rows[:, None] - rows).sum(axis=-1) + start[:, None] - start
-    span = find_largest_span(polytope, rows, start, ignore_progress)
+    pairs = np.abs(rows[:, None] - rows).sum(axis=-1)
+    span = find_largest_span(polytope, rows, ignore_progress)
     assert span.low <= pairs.max() * (1.0 + 1e-9)
     assert pairs.max() <= span.high * (1.0 + 1e-9)
     assert span.high <= 1.02 * span.low
@@ -187,6 +190,26 @@ def test_remainders_are_those_of_points_outside_the_hull():
     remainders = find_remainders(points, np.arange(3))
     np.testing.assert_allclose(remainders[:5], [0.0, 0.0, 0.0, 0.0, 1.0], atol=1e-3)
     assert remainders[5] == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.nightly
+def test_table_of_the_contour_piece():
+    scene = load_scene("part_on_dvf5000")
+    result = find_worst_machine(scene, load_plan(default_plan(scene), scene), Acceptance(part=True))
+    page = (DOCS / "acceptance.md").read_text("utf-8")
+    heading = f"| contour piece, 160 × 160 mm, after {len(result.tests)} tests |"
+    rows = page.split(heading, 1)[1].split("\n\n", 1)[0].splitlines()[2:]
+    shown = {row.split("|")[1].split(",")[0].strip(): row for row in rows}
+    assert sorted(shown) == sorted(each.name for each in result.measurands)
+    for each in result.measurands:
+        numbers = [float(text) for text in re.findall(r"([\d.]+) µ", shown[each.name])]
+        expected = each.tolerance[1], *each.bound, each.without_tests
+        assert numbers == [round(number, 1) for number in expected], each
+        assert each.is_kept is (each.name != "back")
+    assert f"leave {result.bound_um[0]:.0f} µm in the volume guarantee three of the four" in page
+    open_without = [each for each in result.measurands if each.without_tests > each.tolerance[1]]
+    assert len(open_without) == 3
+    assert "Without the tests, three of the four would be open" in page
 
 
 def test_cancelled_and_too_large(tmp_path, monkeypatch):
@@ -203,5 +226,5 @@ def test_cancelled_and_too_large(tmp_path, monkeypatch):
         find_worst_machine(two, (), Acceptance(part=True), cancel)
     assert shares[-1] < 1.0
     monkeypatch.setattr("warpspace.acceptance_tests.measurands.MAX_FEATURE_TRIANGLES", 10)
-    with pytest.raises(OptionError, match=r"\{part\}: \d+ triangles; features are .* up to 10$"):
+    with pytest.raises(OptionError, match=r"part: \d+ triangles; features are .* up to 10$"):
         find_worst_machine(scene, (), Acceptance(part=True))

@@ -32,9 +32,10 @@ from warpspace.units import Array
 MACHINES = 2000  # random ones in which points of a form are extreme
 STARTS = 8  # of them, from which the largest form error is searched
 COVERED = 0.0025  # share of a form error by which points are means of others
-POINTS = 400  # of a surface that are paired, unless more are extreme in random machines
+POINTS = 600  # of a surface that are paired, unless more are extreme in random machines
 PAIRS = 300  # pairs of points of a surface that are solved
 RANK_TOLERANCE = 1e-9  # share of the largest response
+NEGLIGIBLE_UM = 1e-6
 REPORTED_UM = 0.5  # interpolation errors that are reported
 
 
@@ -113,7 +114,7 @@ class PartModel:
     def remarks(self) -> Iterator[str]:
         nonlinear = [self.spell(measure) for measure in self.bands if measure not in self.linear]
         if nonlinear:
-            yield f"not linear in the errors, no bound: {', '.join(nonlinear)}"
+            yield f"no bound, not linear in the errors: {', '.join(nonlinear)}"
         if self.outside:
             far = f"{self.outside:,} vertices of the part"
             yield f"{far} are beyond the travel; their errors are continued"
@@ -140,19 +141,16 @@ def find_largest_deviations(
         tick(0.0)
         band, kind = model.bands[measure], inspection.KINDS[measure[0]]
         ends = _find_extremes(passing, linear, tick)
-        largest = max(ends, key=attrgetter("low"))
-        high = max(end.high for end in ends)
-        is_kept = None
+        largest, is_kept = max(ends, key=attrgetter("low")), None
         if band is not None:
-            limits = -band[0], band[1]
-            if all(end.high <= limit for end, limit in zip(ends, limits, strict=True)):
-                is_kept = True
-            elif any(end.low > limit for end, limit in zip(ends, limits, strict=True)):
-                is_kept = False
+            (down, up), (low, high) = ends, band
+            is_kept = down.high <= -low and up.high <= high
+            if not is_kept and down.low <= -low and up.low <= high:
+                is_kept = None
         yield Measurand(
             model.names[measure[1][0]],
             inspection.spell_measure(measure, model.names),
-            (largest.low, high),
+            (largest.low, max(end.high for end in ends)),
             max(end.low for end in _find_extremes(all_machines, linear, tick)),
             "urad" if kind.is_angle else "um",
             band,
@@ -182,13 +180,13 @@ def _find_extremes(
         worst = find_largest_error(polytope, rows[None], tick)
         largest = Extreme(worst.low_um, worst.high_um, worst.machine)
     else:
-        largest = find_largest_span(polytope, rows, linear.start, tick)
+        largest = find_largest_span(polytope, rows, tick)
     return (none, largest) if linear.sign > 0.0 else (largest, none)
 
 
 class _LargestSpanSearch:
-    def __init__(self, polytope: Polytope, rows: Array, start: Array) -> None:
-        self.polytope, self.rows, self.start = polytope, rows, start
+    def __init__(self, polytope: Polytope, rows: Array) -> None:
+        self.polytope, self.rows = polytope, rows
         self.middle = (polytope.upper + polytope.lower) / 2.0
         self.half = (polytope.upper - polytope.lower) / 2.0
         self.best = Extreme(0.0, 0.0, self.middle)
@@ -198,12 +196,11 @@ class _LargestSpanSearch:
         maximum = None
         while True:
             vertex = self.polytope.maximise(self.rows[first] - self.rows[second])
-            if maximum is None:
-                maximum = vertex.maximum + self.start[first] - self.start[second]
-            values = self.start + self.rows @ vertex.point
+            maximum = vertex.maximum if maximum is None else maximum
+            values = self.rows @ vertex.point
             span = float(np.ptp(values))
             if span <= self.best.low * (1.0 + 1e-4):
-                return float(maximum)
+                return maximum
             self.best = Extreme(span, 0.0, vertex.point)
             first, second = int(values.argmax()), int(values.argmin())
 
@@ -211,15 +208,15 @@ class _LargestSpanSearch:
         """Return points that can be extreme, and the largest remainder of others."""
         rng = np.random.default_rng(0)
         signs = rng.choice((-1.0, 1.0), (MACHINES, len(self.half)))
-        values = self.start[:, None] + self.rows @ (self.middle + self.half * signs).T
+        values = self.rows @ (self.middle + self.half * signs).T
         low, high = values.argmin(axis=0), values.argmax(axis=0)
         for first, second in zip(high[:STARTS], low[:STARTS], strict=True):
             self.maximise(int(first), int(second))
         chosen = np.unique([low, high])
-        points = np.column_stack([self.rows * self.half, self.start + self.rows @ self.middle])
+        points = np.column_stack([self.rows * self.half, self.rows @ self.middle])
         remainder = find_remainders(points, chosen)
         order = np.argsort(-remainder)[: max(POINTS - len(chosen), 0)]
-        added = order[remainder[order] > COVERED * self.best.low]
+        added = order[remainder[order] > max(COVERED * self.best.low, NEGLIGIBLE_UM)]
         remainder[added] = 0.0
         return np.union1d(chosen, added), float(remainder.max())
 
@@ -231,10 +228,8 @@ class _LargestSpanSearch:
         return np.array(maxima)
 
 
-def find_largest_span(
-    polytope: Polytope, rows: Array, start: Array, tick: ProgressCallback
-) -> Extreme:
-    """Find the largest span of start + rows @ machine, rows [n, V], over a polytope.
+def find_largest_span(polytope: Polytope, rows: Array, tick: ProgressCallback) -> Extreme:
+    """Find the largest span of rows @ machine, rows [n, V], over a polytope.
 
     It is that of two points, each extreme for some machine. Paired are the points that are extreme
     for one of `MACHINES` random ones, and those that are not weighted means of these within
@@ -243,18 +238,17 @@ def find_largest_span(
     bound is solved next, until the bounds differ by `GAP`, or after `PAIRS`: the upper bound is
     proved in any case.
     """
-    search = _LargestSpanSearch(polytope, rows, start)
+    search = _LargestSpanSearch(polytope, rows)
     chosen, remainder = search.choose_points()
-    points, offset = rows[chosen], start[chosen]
+    points = rows[chosen]
     up = search.find_maxima(chosen, 1.0, tick)
     down = up if polytope.is_symmetric else search.find_maxima(chosen, -1.0, tick)
     by_tolerances = np.array([polytope.bounds(point - points) for point in points])
-    upper = np.minimum(by_tolerances, up[:, None] + down) + offset[:, None] - offset
-    if polytope.is_symmetric and not start.any():
-        upper = np.triu(upper)
+    upper = np.minimum(by_tolerances, up[:, None] + down)
+    upper = np.triu(upper) if polytope.is_symmetric else upper
     for _ in range(PAIRS):
         first, second = divmod(int(upper.argmax()), len(chosen))
-        if upper[first, second] + 2.0 * remainder <= (1.0 + GAP) * search.best.low:
+        if upper[first, second] + 2.0 * remainder <= (1.0 + GAP) * search.best.low + NEGLIGIBLE_UM:
             break
         tick(0.0)
         upper[first, second] = search.maximise(chosen[first], chosen[second])
@@ -267,8 +261,8 @@ def find_remainders(points: Array, chosen: Array) -> Array:
     from scipy.optimize import nnls
 
     left, size, _ = np.linalg.svd(points, full_matrices=False)
-    is_used = size > RANK_TOLERANCE * max(size[0], 1e-30)
-    coordinates = np.column_stack([left[:, is_used] * size[is_used], np.full(len(points), size[0])])
+    is_used, ones = size > RANK_TOLERANCE * size[0], np.full(len(points), size[0] or 1.0)
+    coordinates = np.column_stack([left[:, is_used] * size[is_used], ones])
     remainders, basis = np.zeros(len(points)), coordinates[chosen].T
     for index in np.setdiff1d(np.arange(len(points)), chosen):
         weights, _ = nnls(basis, coordinates[index])

@@ -455,10 +455,8 @@ def inspect(
     names, features, bands = read_measures(mesh, tolerances, noise_um)
     if not bands:
         return ()
-    turn, evaluate_measures = (
-        mesh_rotation(mesh, actual),
-        partial(_evaluate_measures, features, bands),
-    )
+    turn = mesh_rotation(mesh, actual)
+    evaluate_measures = partial(_evaluate_measures, features, bands)
     fit = partial(subtract_best_fit, points, shares=mesh.shares)
     errors = [actual.error_um]
     if any(bands.values()):
@@ -523,12 +521,10 @@ def spell_measure(measure: MeasureKey, names: Sequence[str]) -> str:
 class LinearMeasure(NamedTuple):
     """A measure to first order in K small displacements: its deviation, µm or µrad.
 
-    Of one row the number rows · v; of three their norm, of more their span about `start`, both
-    times the sign.
+    Of one row the number rows · v; of three their norm, of more their span, both times the sign.
     """
 
     rows: Array  # [r, K]
-    start: Array  # [r]; residuals of a scan, 0 of a nominal mesh
     sign: float  # of deviations that have only one, else 0
 
 
@@ -537,8 +533,8 @@ def linearise_measures(
 ) -> list[LinearMeasure | None]:
     """Compute the response of measures to displacements, [K, n, 3], in the frame of the mesh.
 
-    None where a measure is not linear: where a fit is not by least squares, or where a nominal
-    distance or angle is so small, but not zero, that its direction changes.
+    None where a measure is not linear: the form of a scan, a fit that is not by least squares, or
+    a nominal distance or angle so small, but not zero, that its direction changes.
     """
     moves = np.concatenate([0.0 * move_um[:1], move_um])
     is_linear = [feature.fit == schema.LEAST_SQUARES for feature in features]
@@ -554,20 +550,18 @@ def _linearise(name: str, motions: Sequence[ShapeMotion]) -> LinearMeasure | Non
     kind = KINDS[name]
     unit = URAD_PER_RAD if kind.is_angle else UM_PER_MM
     start, *moved = kind.vectors(*motions)
-    rows, size, sign = (np.array(moved) - start).T, float(np.linalg.norm(start)), 1.0
+    rows, size = (np.array(moved) - start).T * unit, float(np.linalg.norm(start))
     if len(rows) == 1:
-        return LinearMeasure(rows * unit, 0.0 * start, 0.0)
-    if kind.vectors not in (_displacement, _separation, _turn_between):
-        return LinearMeasure(rows * unit, start * unit, 1.0)
-    if kind.is_angle:
-        offset = _angle_offset(*motions)
-        sign = -1.0 if offset > size + RIGHT_RAD else 1.0
+        return LinearMeasure(rows, 0.0)
+    if len(rows) > 3:
+        return None if size else LinearMeasure(rows, 1.0)
     zero, small = (RIGHT_RAD, SMALL_RAD) if kind.is_angle else (AXIS_MM, SMALL_MM)
+    beyond = size - _angle_offset(*motions) if kind.is_angle else size
+    sign = -1.0 if beyond < -zero else 1.0
     if size <= zero:
-        return LinearMeasure(rows * unit, np.zeros(3), sign)
-    along = sign * (start / size) @ rows[None] * unit
-    is_zero = kind.is_angle and abs(_angle_offset(*motions) - size) <= RIGHT_RAD
-    return LinearMeasure(along, np.zeros(1), float(is_zero)) if size > small else None
+        return LinearMeasure(rows, sign)
+    along = sign * (start / size) @ rows[None]
+    return LinearMeasure(along, float(abs(beyond) <= zero)) if size > small else None
 
 
 def measure_changes(
