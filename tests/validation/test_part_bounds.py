@@ -22,7 +22,9 @@ from warpspace.acceptance_tests.polytope import Constraint, Polytope
 from warpspace.analysis.description import ignore_progress
 from warpspace.bench.linear_form import absolute
 from warpspace.exceptions import OptionError
+from warpspace.parts.inspection import find_features, linearise_measures
 from warpspace.parts.part import Part
+from warpspace.parts.workpiece import load_workpiece
 from warpspace.scene.library import load_scene
 
 SCENE = """[machine]
@@ -171,6 +173,25 @@ def test_a_minimum_zone_is_named_and_has_no_number(tmp_path):
     result = find_worst_machine(scene, (), Acceptance(part=True))
     assert [each.name for each in result.measurands] == ["second"]
     assert "no bound, not linear in the errors: top · flatness" in [*result.caveats()]
+
+
+def test_forms_of_scans_and_small_angles_are_not_linear(tmp_path):
+    scene_of(tmp_path, SQUARENESS)
+    mesh = load_workpiece(tmp_path / "plate.stl")
+    first, same, *_ = find_features(mesh).values()  # top and bottom
+    moves = np.random.default_rng(1).normal(size=(2, len(mesh.vertices_mm), 3))
+    scan = replace(first, residual_mm=1e-3 * np.arange(len(first.vertices)))
+    measures = [("flatness", (0,)), ("position", (0,))]
+    forms = linearise_measures([first], measures, moves)
+    scans = linearise_measures([scan], measures, moves)
+    assert forms[0].rows.shape == (len(first.vertices), 2)
+    assert scans[0] is None
+    np.testing.assert_allclose(scans[1].rows, forms[1].rows)
+    for angle, count in ((0.0, 3), (5e-3, None), (0.1, 1)):
+        turned = same.shape.move(np.array([0, 0, 0, angle, 0, 0, 0, 0]))
+        pair = [first, replace(same, shape=turned)]
+        (parallel,) = linearise_measures(pair, [("angle", (1, 0))], moves)
+        assert (parallel and len(parallel.rows)) == count
 
 
 def test_span_of_the_corners_of_a_box_is_that_of_all_pairs():

@@ -27,7 +27,7 @@ from warpspace.parts.workpiece import (
 )
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import read_text
-from warpspace.units import Array
+from warpspace.units import Array, Integers
 
 MACHINES = 2000  # random ones in which points of a form are extreme
 STARTS = 8  # of them, from which the largest form error is searched
@@ -204,7 +204,7 @@ class _LargestSpanSearch:
             self.best = Extreme(span, 0.0, vertex.point)
             first, second = int(values.argmax()), int(values.argmin())
 
-    def choose_points(self) -> tuple[Array, float]:
+    def choose_points(self) -> tuple[Integers, float]:
         """Return points that can be extreme, and the largest remainder of others."""
         rng = np.random.default_rng(0)
         signs = rng.choice((-1.0, 1.0), (MACHINES, len(self.half)))
@@ -220,7 +220,7 @@ class _LargestSpanSearch:
         remainder[added] = 0.0
         return np.union1d(chosen, added), float(remainder.max())
 
-    def find_maxima(self, chosen: Array, sign: float, tick: ProgressCallback) -> Array:
+    def find_maxima(self, chosen: Integers, sign: float, tick: ProgressCallback) -> Array:
         maxima = list[float]()
         for point in self.rows[chosen]:
             tick(0.0)
@@ -256,7 +256,7 @@ def find_largest_span(polytope: Polytope, rows: Array, tick: ProgressCallback) -
     return search.best._replace(high=max(search.best.low, high))
 
 
-def find_remainders(points: Array, chosen: Array) -> Array:
+def find_remainders(points: Array, chosen: Integers) -> Array:
     """Compute what remains of points, [n, d], as weighted means of chosen ones, sums of sizes."""
     from scipy.optimize import nnls
 
