@@ -37,7 +37,8 @@ from warpspace.units import Array
 
 KNOTS = (2, 21)
 MAX_NEXT = 10
-FACTOR_STEPS = 7  # that halve the interval of a factor
+MIN_FACTOR = 1.0 / 128.0
+FACTOR_STEP = 0.015  # relative difference of factors that do and do not keep a limit
 MAX_SLOPE = 1e6
 MAX_SECOND_DIFFERENCE = 1e9
 MIN_CONTRIBUTION = 0.01  # share of |E| of an error that the table lists
@@ -354,13 +355,14 @@ def find_factor(
     """
     if worst.high_um <= limit_um:
         return 1.0
-    low, high, factor = 0.0, 1.0, None
-    for step in range(FACTOR_STEPS):
-        watch(0.3 + 0.3 * step / FACTOR_STEPS)
+    low, high, factor, steps = 0.0, 1.0, None, 0
+    while high - low > (FACTOR_STEP * low or MIN_FACTOR):
+        steps += 1
+        watch(0.4 + 0.1 * (1.0 - 0.8**steps))
         middle = (low + high) / 2.0
         scaled = [replace(each, limit=middle * each.limit) for each in constraints]
         try:
-            largest = curves.find_largest(scaled, lambda _: watch(0.3), limit_um=limit_um)
+            largest = curves.find_largest(scaled, lambda _: watch(0.4), limit_um=limit_um)
         except InfeasibleError:
             low = middle
             continue

@@ -10,6 +10,7 @@ from warpspace.acceptance_tests.polytope import (
     Constraint,
     LargestError,
     Polytope,
+    bound_nodes,
     find_largest_error,
 )
 from warpspace.analysis.description import ProgressCallback
@@ -170,7 +171,12 @@ class ErrorCurves:
         stop_um: float = np.inf,
     ) -> LargestError:
         polytope = self.polytope(constraints)
-        return find_largest_error(polytope, self.gains, watch, limit_um, stop_um)
+        bounds = self._node_bounds
+        return find_largest_error(polytope, self.gains, watch, limit_um, stop_um, bounds)
+
+    @cached_property
+    def _node_bounds(self) -> Array:
+        return bound_nodes(self.lower, self.upper, self.gains)
 
     def find_ranges(
         self, constraints: Sequence[Constraint], watch: ProgressCallback

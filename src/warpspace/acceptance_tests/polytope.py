@@ -264,12 +264,22 @@ class _LargestErrorSearch:
         return -queue[0][0]
 
 
+def bound_nodes(lower: Array, upper: Array, gains: Array) -> Array:
+    """Compute upper bounds of |E| at nodes, [N], by the tolerances alone."""
+    triangles, box = icosahedron(), Polytope(lower, upper, ())
+    heights = np.stack([box.bounds(triangles @ each) for each in gains])
+    return np.array(
+        [max(cone_bound(t, h) for t, h in zip(triangles, each, strict=True)) for each in heights]
+    )
+
+
 def find_largest_error(
     polytope: Polytope,
     gains: Array,
     watch: Callable[[float], None],
     limit_um: float = np.inf,
     stop_um: float = np.inf,
+    bounds: Array | None = None,
 ) -> LargestError:
     """Find the largest |E| over nodes and machines, with bounds that differ by at most `GAP`.
 
@@ -284,6 +294,8 @@ def find_largest_error(
         exceeds `CLOSE` of it.
     stop_um : float, optional
         Size of an error at which the search ends: the upper bound is infinite then.
+    bounds : ndarray, [N], µm, optional
+        `bound_nodes` of the box and the gains, where they are known.
 
     Notes
     -----
@@ -295,11 +307,7 @@ def find_largest_error(
     tolerances alone is small enough are not solved.
     """
     search, high = _LargestErrorSearch(polytope, gains, limit_um, stop_um), 0.0
-    triangles = icosahedron()
-    heights = np.stack([polytope.bounds(triangles @ each) for each in gains])
-    bounds = np.array(
-        [max(cone_bound(t, h) for t, h in zip(triangles, each, strict=True)) for each in heights]
-    )
+    bounds = bound_nodes(polytope.lower, polytope.upper, gains) if bounds is None else bounds
     for done, node in enumerate(np.argsort(-bounds)):
         if bounds[node] <= max(search.threshold_um, high):
             break
