@@ -25,8 +25,7 @@ from warpspace.acceptance_tests.next_tests import FurtherTests, build_constraint
 from warpspace.acceptance_tests.plans import load_plan
 from warpspace.analysis.description import ignore_progress
 from warpspace.bench.plan import simulate
-from warpspace.calibration.instruments import NO_INSTRUMENT
-from warpspace.calibration.readings import bundled_data
+from warpspace.calibration.instruments import NO_INSTRUMENT, load_instrument
 from warpspace.calibration.registry import find_kind, parse_readings
 from warpspace.exceptions import OptionError
 from warpspace.machine.errors import Constant, Covariance, ErrorSet, TableCurve, Tolerance
@@ -207,7 +206,9 @@ def test_sampled_machines_stay_within_ranges_and_bound(tmp_path):
         step = rng.uniform(steps[steps < 0.0].max(initial=-1.0), steps[steps > 0.0].min())
         point = point + step * direction
         machines.append(point[:count])
-    low, high = (np.array([result.ranges[key][end] for key, _ in curves.variables]) for end in (0, 1))
+    low, high = (
+        np.array([result.ranges[key][end] for key, _ in curves.variables]) for end in (0, 1)
+    )
     assert np.all((low - 1e-6 <= machines) & (machines <= high + 1e-6))
     norms = np.linalg.norm(np.einsum("nxv,mv->mnx", curves.gains, machines), axis=-1)
     assert 0.3 * result.bound_um[1] < norms.max() <= result.bound_um[1]
@@ -236,17 +237,24 @@ def test_readings_of_a_test(tmp_path):
     assert (low, high) == pytest.approx((70.0 - half, 70.0 + half), abs=0.6)
 
 
-@pytest.mark.parametrize("instrument", ["", "tracking_laser"])
-def test_readings_without_uncertainty_are_refused_unless_an_instrument_is_stated(
-    tmp_path, instrument
-):
-    assert bundled_data()
+def test_an_instrument_states_the_uncertainty_of_readings_without_one(tmp_path):
+    """Scatter 0.5 µm of each reading, and a zero with u = 1.2 µm common to all: u = 1.3 µm."""
     scene = scene_of(tmp_path, ONLY.format(key="EC0Y", half=200))
     rows = [(0.0, 0.0, -280.0, 0.0, 0.0, 0.0), (0.0, 200.0, -280.0, -8.0, 0.0, 0.0)]
     data = (write(tmp_path, rows, header=HEADER.replace(",u_um", "")),)
-    if not instrument:
-        with pytest.raises(OptionError, match=r"readings\.csv: the uncertainty .* u_um"):
-            find_worst_machine(scene, (), replace(ROUGH, data=data))
+    with pytest.raises(OptionError, match=r"readings\.csv: the uncertainty of its .* u_um"):
+        find_worst_machine(scene, (), replace(ROUGH, data=data))
+    lines = [
+        f'[[contributions]]\nname = "{acts}"\ntype = "B"\ndistribution = "normal"\n'
+        f'value = {um}\nunit = "µm"\nsensitivity = 1\nacts = "{acts}"\nsource = "test"\n'
+        for acts, um in (("each", 0.5), ("all", 1.2))
+    ]
+    file = tmp_path / "probe.toml"
+    file.write_text("".join(lines), "utf-8")
+    request = replace(ROUGH, data=data, instrument=load_instrument(str(file)))
+    half = factor(6) * 1.3 / 0.2
+    ranges = find_worst_machine(scene, (), request).ranges
+    assert ranges["EC0Y"] == pytest.approx((40.0 - half, 40.0 + half), rel=1e-6)
 
 
 def test_refusals(tmp_path):
@@ -255,18 +263,22 @@ def test_refusals(tmp_path):
         find_worst_machine(scene, (), replace(ROUGH, measured=True))
     with pytest.raises(OptionError, match=r"2 values of kinds for 1 files"):
         find_worst_machine(scene, (), replace(ROUGH, data=("a.csv",), kinds=("points", "points")))
+    with pytest.raises(OptionError, match="no readings; expected data FILE"):
+        find_worst_machine(scene, (), replace(ROUGH, kinds=("points",)))
     rows = [(0.0, 0.0, -280.0, 0.0, 0.0, 0.0, 0.5), (0.0, 200.0, -280.0, -80.0, 0.0, 0.0, 0.5)]
     far = write(tmp_path, rows, "far.csv")
     with pytest.raises(OptionError, match=r"the readings of far\.csv exclude all"):
         find_worst_machine(scene, (), replace(ROUGH, data=(far,)))
     rows[1] = (0.0, 200.0, -280.0, -20.0, 0.0, 0.0, 0.5)
     near, tests = write(tmp_path, rows, "near.csv"), plan_of(scene, CIRCLES[:1] + LINES[:1])
-    with pytest.raises(OptionError, match=r": the readings of near\.csv and circular XY .*each oth"):
+    with pytest.raises(
+        OptionError, match=r": the readings of near\.csv and circular XY .*each oth"
+    ):
         find_worst_machine(scene, tests, replace(ROUGH, data=(near,)))
 
 
 def test_second_difference(tmp_path):
-    """Three knots, EXX relative to the middle one: |e₁ − e₂| ≤ 10 + d/2, d the second difference."""
+    """Three knots, EXX relative to the middle: |e₁ − e₂| ≤ 10 + d/2, d the second difference."""
     scene = scene_of(tmp_path, ONLY.format(key="EXX", half=10))
     limit = 10.0 / 0.275**2  # µm/m², 10 µm between knots 0.275 m apart
     result = find_worst_machine(scene, (), replace(ROUGH, second_difference=limit))
@@ -292,7 +304,7 @@ def test_smallest_set_is_that_of_an_exhaustive_search(tmp_path, share):
     curves, constraints, further = further_tests(tmp_path, [LINES[0], LINES[3]])
     worst = curves.find_largest(constraints, ignore_progress)
     fails = [n for n, each in enumerate(further.constraints) if not passes(worst.machine, each)]
-    few = fails[:8] + [0]
+    few = [*fails[:8], 0]
     further.tests = [further.tests[number] for number in few]
     further.constraints = [further.constraints[number] for number in few]
     further.passing = further.passing[few]

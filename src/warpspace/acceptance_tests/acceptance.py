@@ -27,7 +27,7 @@ from warpspace.analysis.options import Files, Grammar, option, place_words, type
 from warpspace.bench.base import run_test
 from warpspace.calibration.calibrate import Budget
 from warpspace.calibration.instruments import NO_INSTRUMENT, instrument_names
-from warpspace.calibration.registry import read_readings
+from warpspace.calibration.registry import pair_kinds, read_readings
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import compare_orders, evaluate_field
 from warpspace.machine.axes import parameter
@@ -127,16 +127,12 @@ class Acceptance(Analysis):
 
     def estimates(self, curves: ErrorCurves, watch: ProgressCallback) -> Iterator[Estimates]:
         """Read what is known of the machine; raise OptionError where its uncertainty is not."""
-        kinds = self.kinds if len(self.kinds) > 1 else (self.kinds or (None,)) * len(self.data)
-        if len(kinds) != len(self.data):
-            raise OptionError(
-                f"{len(kinds)} values of {{kinds}} for {len(self.data)} files; expected 1 or"
-                f" {len(self.data)}"
-            )
+        if (self.kinds or self.instrument.name) and not self.data:
+            raise OptionError("{kinds}, {instrument}: no readings; expected {data} FILE")
         if self.measured:
             yield from estimate_from_scene(curves)
         if self.data:
-            files = zip(self.data, kinds, strict=True)
+            files = zip(self.data, pair_kinds(self.data, self.kinds), strict=True)
             sets = [read_readings(name, curves.scene, kind) for name, kind in files]
             yield from estimate_from_readings(curves, sets, self.instrument, watch)
 
@@ -252,27 +248,15 @@ class AcceptanceResult(Result):
             )
 
     def _range_table(self, ranges: Mapping[str, tuple[float, float]]) -> Table:
-        tolerances = self.scene.tolerances
-        rows = [(parameter(key), *ends, tolerances.get(key)) for key, ends in ranges.items()]
-        ends = ("lowest", "highest", "tolerance from", "to")
-        return Table(
-            (
-                Column("key", leads=True),
-                Column("error", wraps=True),
-                *(Column(name, ".2f") for name in ends),
-                Column("unit"),
-            ),
-            [
-                (
-                    *(row.key, row.name, low, high),
-                    *(tolerance.centre + sign * tolerance.half_width for sign in (-1, 1)),
-                    row.unit,
-                )
-                for row, low, high, tolerance in rows
-                if tolerance is not None
-            ],
-            title="Errors that remain possible",
-        )
+        curves = ErrorCurves(self.scene, self.knots)
+        lower, upper = curves.by_key(curves.lower), curves.by_key(curves.upper)
+        columns = number_columns(("lowest", "highest", "tolerance from", "to"))
+        rows = [
+            (key, parameter(key).name, *ends, lower[key][0], upper[key][0], parameter(key).unit)
+            for key, ends in ranges.items()
+        ]
+        columns = (Column("key", leads=True), Column("error", wraps=True), *columns, Column("unit"))
+        return Table(columns, rows, title="Errors that remain possible")
 
     def caveats(self) -> Iterator[str]:
         yield from super().caveats()

@@ -166,17 +166,18 @@ class FurtherTests:
         machines; or a machine that passes it exceeds the limit, and is added. Exceeding counts from
         `CLOSE` of the limit.
         """
-        everything = range(len(self.tests))
-        if self._find_exceeding(everything, limit_um) is not None:
-            return None
+        tick = partial(_keep_share, self.watch, SET_SHARE)
         while True:
-            chosen = self._hit(self.sizes_um > CLOSE * limit_um)
-            exceeding = self._find_exceeding(chosen, limit_um)
-            if exceeding is None:
+            fails = ~self.passing[:, self.sizes_um > CLOSE * limit_um].T
+            if not fails.any(axis=1).all():
+                return None  # a machine that passes all candidates
+            chosen = self._hit(fails) if len(fails) else []
+            largest = self.curves.find_largest(self.with_candidates(chosen), tick, limit_um)
+            if largest.high_um <= limit_um:
                 return [FurtherTest.of(self.tests[number]) for number in chosen]
-            passed = self.add(exceeding.machine)
-            gain = exceeding.error_um / exceeding.low_um @ self.curves.gains[exceeding.node]
-            for number in everything:  # pass further tests, so that fewer candidates exclude it
+            passed = self.add(largest.machine)
+            gain = largest.error_um / largest.low_um @ self.curves.gains[largest.node]
+            for number in range(len(self.tests)):  # pass more, so that fewer exclude it
                 if passed[number]:
                     continue
                 self.watch(SET_SHARE)
@@ -185,18 +186,13 @@ class FurtherTests:
                 if vertex.maximum > CLOSE * limit_um:
                     passed = passed | self.add(vertex.point)
 
-    def _find_exceeding(self, chosen: Iterable[int], limit_um: float) -> LargestError | None:
-        tick = partial(_keep_share, self.watch, SET_SHARE)
-        largest = self.curves.find_largest(self.with_candidates(chosen), tick, limit_um)
-        return None if largest.high_um <= limit_um else largest
+    def _hit(self, fails: NDArray[np.bool_]) -> list[int]:
+        """Choose the fewest candidates that exclude machines; of several sets the quickest.
 
-    def _hit(self, machines: NDArray[np.bool_]) -> list[int]:
-        """Choose the fewest candidates that exclude machines; of several sets the quickest."""
+        The candidates that each machine fails, [M, C].
+        """
         from scipy.optimize import Bounds, LinearConstraint, milp
 
-        fails = ~self.passing[:, machines].T
-        if not len(fails):
-            return []
         costs = 1.0 + self.minutes / (1.0 + self.minutes.sum())
         optimum = milp(
             costs,
