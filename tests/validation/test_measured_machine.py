@@ -1,5 +1,6 @@
 """Measured machines: closed forms, planted machines, sampled machines; sets of further tests."""
 
+import re
 from dataclasses import replace
 from itertools import combinations
 
@@ -14,6 +15,7 @@ from validation.test_acceptance import (
     DIAGONALS,
     LINES,
     ONLY,
+    PAGE,
     TOLERANCES,
     plan_of,
     scene_of,
@@ -28,7 +30,7 @@ from warpspace.bench.plan import simulate
 from warpspace.calibration.instruments import NO_INSTRUMENT, load_instrument
 from warpspace.calibration.registry import find_kind, parse_readings
 from warpspace.exceptions import OptionError
-from warpspace.machine.errors import Constant, Covariance, ErrorSet, TableCurve, Tolerance
+from warpspace.machine.errors import Constant, Covariance, ErrorSet, Ramp, TableCurve, Tolerance
 from warpspace.scene.library import load_scene
 
 HEADER = "x_mm,y_mm,z_mm,ex_um,ey_um,ez_um,u_um\n"
@@ -401,3 +403,33 @@ def test_tolerances_about_a_centre_and_readings(tmp_path):
     result = find_worst_machine(scene, (), replace(ROUGH, data=(write(tmp_path, rows),)))
     low = 50.0 - factor(6) * 0.5 / 0.2
     assert result.ranges["EC0Y"] == pytest.approx((low, 50.0), rel=1e-6)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("nodes", [2, 3, 5])
+def test_table_of_measured_points(tmp_path, nodes):
+    """The table of docs/acceptance.md: simulated readings, u = 2 µm, on grids of the volume."""
+    scene = scene_of(tmp_path, TOLERANCES)
+    curves = {
+        "EXX": Ramp(scene.axis_span("X"), 6.0),
+        "ECX": Ramp(scene.axis_span("X"), -12.0),
+        "EAY": Ramp(scene.axis_span("Y"), 15.0),
+        "EC0Y": Constant((0.0, 1.0), 14.0),
+        "EB0Z": Constant((0.0, 1.0), -9.0),
+    }
+    machine = replace(scene, errors=ErrorSet(curves), reference=None)
+    error_um = warpspace.evaluate(machine, grid=nodes, exact=True).error_um.reshape(-1, 3)
+    ends = [np.linspace(*scene.workspace.ranges[axis], nodes) for axis in "XYZ"]
+    points = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, 3)
+    rows = np.column_stack([points, error_um, np.full(nodes**3, 2.0)])
+    request = Acceptance(data=(write(tmp_path, rows.tolist()),))
+    tests = plan_of(scene, CIRCLES + LINES + DIAGONALS)
+    result = find_worst_machine(scene, tests, request)
+    printed = {row[0]: row[1:] for row in table_of("points measured")}
+    assert printed[nodes**3] == [round(result.without_tests_um), round(result.bound_um[0])]
+    assert result.ranges["EC0Y"] == pytest.approx((-25.0, 25.0))
+
+
+def table_of(heading):
+    rows = PAGE.split(f"| {heading} |", 1)[1].split("\n\n", 1)[0].splitlines()[3:]
+    return [[int(number) for number in re.findall(r"\d+", row)] for row in rows]
