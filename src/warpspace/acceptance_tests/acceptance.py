@@ -297,10 +297,10 @@ def find_worst_machine(
     measured = limit_estimates([*request.estimates(curves, watch)])
     constraints = [build_constraint(curves, planned, watch) for planned in tests]
     plain = not (request.next_count or request.keep_um or measured)
-    known = replace(curves, measured=measured)
+    agreeing = replace(curves, measured=measured)
     try:
-        without = known.find_largest((), lambda part: watch(0.1 * part))
-        worst = known.find_largest(
+        without = agreeing.find_largest((), lambda part: watch(0.1 * part))
+        worst = agreeing.find_largest(
             constraints, lambda part: watch(0.1 + (0.9 if plain else 0.2) * part)
         )
     except InfeasibleError as error:
@@ -309,15 +309,15 @@ def find_worst_machine(
         if measured and names[0] == measured[0].name and not names[1:]:
             verb = "exclude all"
         raise OptionError(f"{error}: {' and '.join(names)} {verb}") from None
-    report = _report(known, worst, without.low_um, list(zip(tests, constraints, strict=True)))
+    report = _report(agreeing, worst, without.low_um, list(zip(tests, constraints, strict=True)))
     if measured:
-        ranges = known.find_ranges(constraints, lambda part: watch(0.3 + 0.1 * part))
+        ranges = agreeing.find_ranges(constraints, lambda part: watch(0.3 + 0.1 * part))
         report = replace(report, measured=tuple(each.name for each in measured), ranges=ranges)
     if request.keep_um is not None:
-        factor = find_factor(known, constraints, worst, request.keep_um, watch)
+        factor = find_factor(agreeing, constraints, worst, request.keep_um, watch)
         report = replace(report, keep_um=request.keep_um, factor=factor)
     if request.next_count:
-        further = FurtherTests(known, tests, constraints, watch)
+        further = FurtherTests(agreeing, tests, constraints, watch)
         report = replace(report, next=tuple(further.find_next(worst, request.next_count)))
         if scene.limit_um is not None:
             smallest = further.find_smallest_set(scene.limit_um)

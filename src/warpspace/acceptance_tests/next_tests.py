@@ -126,8 +126,8 @@ class FurtherTests:
             is_open[chosen] = False
             while is_open.any():
                 # largest |E| of the known machines that pass the chosen tests and a candidate
-                known = self.sizes_um * np.all(self.passing[chosen], axis=0)
-                left_um = np.max(self.passing * known, axis=1)
+                remaining_um = self.sizes_um * np.all(self.passing[chosen], axis=0)
+                left_um = np.max(self.passing * remaining_um, axis=1)
                 targets_um = np.minimum(NEEDED * worst.low_um, worst.low_um - rate * self.minutes)
                 is_open &= left_um <= targets_um
                 rates = np.where(is_open, (worst.low_um - left_um) / self.minutes, -1.0)
