@@ -22,6 +22,7 @@ from warpspace.app.state.app_state import Specification, start_state
 from warpspace.app.state.form_values import linked_forms
 from warpspace.app.state.tree import put
 from warpspace.kinematics.model import Loop
+from warpspace.machine.errors import Constant, Covariance
 from warpspace.outputs.report.review import ReportSettings, build_review
 
 FIRST = load_scene("dvf5000_first")
@@ -259,6 +260,26 @@ def test_a_refused_plan_is_named_and_changes_nothing(content, message):
     shown = section(alone.part, before)
     assert re.search(message, shown, re.DOTALL)
     assert "<script>" not in shown
+
+
+def test_a_calibrated_scene_is_a_measured_machine():
+    alone = acceptance_panel()
+    part = alone.part
+    assert "measured" not in {option.name for option in part.shown_options(START)}
+    constant = Constant((0.0, 1.0), 23.1)
+    calibrated = replace(
+        FIRST,
+        errors=replace(FIRST.errors, functions={**FIRST.errors.functions, "EC0Y": constant}),
+        covariance=Covariance(("EC0Y",), ((0.25,),)),
+    )
+    form = {"acceptance.plan": PLAN.format(limit=4), "acceptance.measured": "1"}
+    state = replace(start_state(calibrated), page=PAGE, forms=form)
+    assert "measured" in {option.name for option in part.shown_options(state)}
+    ran(part, state)
+    low, high = part.outcome.result.ranges["EC0Y"]
+    half = 0.5 * 1.959964  # one estimate, 95 %
+    assert (low, high) == pytest.approx((23.1 - half, 23.1 + half), abs=1e-4)
+    assert "Errors that remain possible" in section(part, state)
 
 
 def test_paths_of_the_tests_are_drawn_while_the_section_is_open():

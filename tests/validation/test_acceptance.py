@@ -406,6 +406,7 @@ def test_slopes_and_factors(middle):
         assert f"{um} µm" in WORDS
         result = find_worst_machine(middle, tests, Acceptance(slope=slope))
         assert round(result.bound_um[0]) == um
-    assert "with 0.375 × all limits, no machine that passes exceeds 150 µm" in WORDS
-    assert find_worst_machine(middle, tests, Acceptance(keep_um=150.0)).factor == 0.375
+    assert "with 0.379 × all limits, no machine that passes exceeds 150 µm" in WORDS
+    factor = find_worst_machine(middle, tests, Acceptance(keep_um=150.0)).factor
+    assert round(factor, 3) == 0.379
     assert find_worst_machine(middle, tests, Acceptance(keep_um=100.0)).factor is None

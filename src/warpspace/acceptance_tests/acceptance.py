@@ -8,13 +8,27 @@ import numpy as np
 
 from warpspace.acceptance_tests.error_curves import ErrorCurves
 from warpspace.acceptance_tests.measurands import Measurand, PartModel, find_largest_deviations
-from warpspace.acceptance_tests.next_tests import NextTest, build_constraint, find_next_tests
+from warpspace.acceptance_tests.measurements import (
+    Estimates,
+    estimate_from_readings,
+    estimate_from_scene,
+    limit_estimates,
+)
+from warpspace.acceptance_tests.next_tests import (
+    FurtherTest,
+    FurtherTests,
+    NextTest,
+    build_constraint,
+)
 from warpspace.acceptance_tests.plans import UNITS, PlannedTest, default_plan, load_plan, plan_names
 from warpspace.acceptance_tests.polytope import Constraint, InfeasibleError, LargestError
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import NO_JSON, Analysis, Change, ProgressCallback, Result
-from warpspace.analysis.options import Grammar, option, place_words, typed_word
+from warpspace.analysis.options import Files, Grammar, option, place_words, typed_word
 from warpspace.bench.base import run_test
+from warpspace.calibration.calibrate import Budget
+from warpspace.calibration.instruments import NO_INSTRUMENT, instrument_names
+from warpspace.calibration.registry import pair_kinds, read_readings
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import compare_orders, evaluate_field
 from warpspace.machine.axes import parameter
@@ -24,8 +38,10 @@ from warpspace.units import Array, spell_signed
 
 KNOTS = (2, 21)
 MAX_NEXT = 10
-FACTOR_STEPS = 7  # that halve the interval of a factor
+MIN_FACTOR = 1.0 / 128.0
+FACTOR_STEP = 0.015  # relative difference of factors that do and do not keep a limit
 MAX_SLOPE = 1e6
+MAX_SECOND_DIFFERENCE = 1e9
 MIN_CONTRIBUTION = 0.01  # share of |E| of an error that the table lists
 Plan: TypeAlias = Annotated[str | None, Grammar("PLAN", typed_word, is_file=True)]
 
@@ -63,10 +79,35 @@ class Acceptance(Analysis):
         high=MAX_SLOPE,
         unset="unlimited",
     )
+    second_difference: float | None = option(
+        None,
+        "Largest second difference of the errors along linear axes, µm/m² or µrad/m²",
+        low=1e-3,
+        high=MAX_SECOND_DIFFERENCE,
+        unset="unlimited",
+    )
+    data: Files = option(
+        (), "Readings of this machine, which its errors agree with: files as for `calibrate`"
+    )
+    kinds: Annotated[tuple[str, ...], Grammar("KIND", typed_word, each=True)] = option(
+        (),
+        "Kind of the readings, as for `calibrate`; once for all files, or once for each",
+        flag="--kind",
+        unset="recognised from the columns of each file",
+    )
+    instrument: Budget = option(
+        NO_INSTRUMENT,
+        f"Instrument whose uncertainty is included: {', '.join(instrument_names())}, or a file."
+        " Readings without u_um have its scatter",
+        unset="none",
+    )
+    measured: bool = option(
+        False, "Consider machines that agree with the uncertainty of the errors in SCENE only"
+    )
     next_count: int | None = option(
         None,
         "Find up to N more tests of the kinds of the plan, each the one that reduces the bound most"
-        " per minute, until it is below the limit of SCENE",
+        " per minute, until it is below the limit of SCENE; and the smallest set that is",
         flag="--next",
         low=1,
         high=MAX_NEXT,
@@ -91,6 +132,17 @@ class Acceptance(Analysis):
         tests = load_plan(self.plan or default_plan(scene), scene)
         return find_worst_machine(scene, tests, self, watch)
 
+    def estimates(self, curves: ErrorCurves, watch: ProgressCallback) -> Iterator[Estimates]:
+        """Read what is known of the machine; raise OptionError where its uncertainty is not."""
+        if (self.kinds or self.instrument.name) and not self.data:
+            raise OptionError("{kinds}, {instrument}: no readings; expected {data} FILE")
+        if self.measured:
+            yield from estimate_from_scene(curves)
+        if self.data:
+            files = zip(self.data, pair_kinds(self.data, self.kinds), strict=True)
+            sets = [read_readings(name, curves.scene, kind) for name, kind in files]
+            yield from estimate_from_readings(curves, sets, self.instrument, watch)
+
 
 class TestValue(NamedTuple):
     """A test of the plan on the worst machine."""
@@ -112,11 +164,15 @@ class AcceptanceResult(Result):
     bound_um: tuple[float, float]  # of the largest |E|: attained, and proved
     at: Mapping[str, float]  # mm or degrees; where the worst machine has it
     direction: tuple[float, float, float]  # of its error there
-    without_tests_um: float
+    without_tests_um: float  # of the machines that agree with the measurements
     tests: tuple[TestValue, ...]
     errors: Mapping[str, float]  # largest value of each error, µm or µrad
     contributions_um: Mapping[str, float]  # along the direction, the largest first
+    measured: tuple[str, ...] = field(default=(), metadata=NO_JSON)  # names of measurements
+    ranges: Mapping[str, tuple[float, float]] | None = None  # of each error of a measured machine
     next: tuple[NextTest, ...] = ()  # each added to the tests before it
+    limit_um: float | None = field(default=None, metadata=NO_JSON)  # of the smallest set
+    smallest_set: tuple[FurtherTest, ...] | None = None  # None if there is none
     keep_um: float | None = None
     measurands: tuple[Measurand, ...] = ()  # of the part of the scene
     part_remarks: tuple[str, ...] = field(default=(), metadata=NO_JSON)
@@ -126,6 +182,8 @@ class AcceptanceResult(Result):
         document = super().json_fields() | {"tests": [test._asdict() for test in self.tests]}
         unused = {"next"} if not self.next else set[str]()
         unused |= {"measurands"} if not self.measurands else set[str]()
+        unused |= {"ranges"} if self.ranges is None else set[str]()
+        unused |= {"smallest_set"} if self.limit_um is None else set[str]()
         unused |= {"keep_um", "factor"} if self.keep_um is None else set[str]()
         return {key: value for key, value in document.items() if key not in unused}
 
@@ -137,6 +195,8 @@ class AcceptanceResult(Result):
         yield f"{self.scene.title} · {len(self.tests)} tests · {self.knots} knots"
         yield f"  largest |E| of a machine that passes: {low:.1f} µm (at most {high:.1f} µm)"
         yield f"  without tests: {self.without_tests_um:.1f} µm"
+        if self.measured:
+            yield f"  machines that agree with {', '.join(self.measured)}, 95 % together"
         yield f"  at {place_words(self.at)}"
         yield Table(
             (
@@ -174,6 +234,8 @@ class AcceptanceResult(Result):
         )
         if self.measurands:
             yield _measurands_table(self.measurands)
+        if self.ranges is not None:
+            yield self._range_table(self.ranges)
         if self.keep_um is not None and self.factor is None:
             yield f"  no limits of these tests keep |E| ≤ {self.keep_um:g} µm everywhere"
         elif self.keep_um is not None:
@@ -188,6 +250,25 @@ class AcceptanceResult(Result):
                 [(step.name, step.bound_um, step.minutes) for step in self.next],
                 title="Further tests, each added to those before it",
             )
+        if self.limit_um is not None and self.smallest_set is None:
+            yield f"  no further tests of these kinds keep |E| ≤ {self.limit_um:g} µm everywhere"
+        elif self.smallest_set:
+            yield Table(
+                (Column("test", wraps=True, leads=True), Column("time", "g", "min")),
+                [(test.name, test.minutes) for test in self.smallest_set],
+                title=f"Smallest set of further tests with |E| ≤ {self.limit_um:g} µm everywhere",
+            )
+
+    def _range_table(self, ranges: Mapping[str, tuple[float, float]]) -> Table:
+        curves = ErrorCurves(self.scene, self.knots)
+        lower, upper = curves.by_key(curves.lower), curves.by_key(curves.upper)
+        columns = number_columns(("lowest", "highest", "tolerance from", "to"))
+        rows = [
+            (key, parameter(key).name, *ends, lower[key][0], upper[key][0], parameter(key).unit)
+            for key, ends in ranges.items()
+        ]
+        columns = (Column("key", leads=True), Column("error", wraps=True), *columns, Column("unit"))
+        return Table(columns, rows, title="Errors that remain possible")
 
     def caveats(self) -> Iterator[str]:
         yield from super().caveats()
@@ -250,32 +331,43 @@ def find_worst_machine(
         part.
     """
     request = request or Acceptance()
-    curves = ErrorCurves(scene, request.knots, request.slope)
+    curves = ErrorCurves(scene, request.knots, request.slope, request.second_difference)
+    measured = limit_estimates([*request.estimates(curves, watch)])
     constraints = [build_constraint(curves, planned, watch) for planned in tests]
     part = PartModel(curves, watch) if request.part else None
-    plain = not (request.next_count or request.keep_um or part)
-    without = curves.find_largest((), lambda part: watch(0.1 * part))
+    plain = not (request.next_count or request.keep_um or measured or part)
+    agreeing = replace(curves, measured=measured)
     try:
-        worst = curves.find_largest(
+        without = agreeing.find_largest((), lambda part: watch(0.1 * part))
+        worst = agreeing.find_largest(
             constraints, lambda part: watch(0.1 + (0.9 if plain else 0.2) * part)
         )
     except InfeasibleError as error:
-        names = _conflict(curves, constraints, watch)
-        verb = "cannot be passed" if len(names) == 1 else "exclude each other"
-        raise OptionError(f"{error}: {', '.join(names)} {verb}") from None
-    report = _report(curves, worst, without.low_um, list(zip(tests, constraints, strict=True)))
+        names = _conflict(curves, [*measured, *constraints], watch)
+        verb = "exclude each other" if names[1:] else "cannot be passed"
+        if measured and names[0] == measured[0].name and not names[1:]:
+            verb = "exclude all"
+        raise OptionError(f"{error}: {' and '.join(names)} {verb}") from None
+    report = _report(agreeing, worst, without.low_um, list(zip(tests, constraints, strict=True)))
+    if measured:
+        ranges = agreeing.find_ranges(constraints, lambda part: watch(0.3 + 0.1 * part))
+        report = replace(report, measured=tuple(each.name for each in measured), ranges=ranges)
     if part is not None:
-        step = 0.3 if request.next_count or request.keep_um else 0.7
+        step = 0.1 if request.next_count or request.keep_um else 0.6
         measurands = find_largest_deviations(
-            curves, constraints, part, lambda share: watch(0.3 + step * share)
+            agreeing, constraints, part, lambda share: watch(0.4 + step * share)
         )
         report = replace(report, measurands=tuple(measurands), part_remarks=tuple(part.remarks()))
     if request.keep_um is not None:
-        factor = find_factor(curves, constraints, worst, request.keep_um, watch)
+        factor = find_factor(agreeing, constraints, worst, request.keep_um, watch)
         report = replace(report, keep_um=request.keep_um, factor=factor)
     if request.next_count:
-        steps = find_next_tests(curves, tests, constraints, worst, request.next_count, watch)
-        report = replace(report, next=tuple(steps))
+        further = FurtherTests(agreeing, tests, constraints, watch)
+        report = replace(report, next=tuple(further.find_next(worst, request.next_count)))
+        if scene.limit_um is not None:
+            smallest = further.find_smallest_set(scene.limit_um)
+            smallest = None if smallest is None else tuple(smallest)
+            report = replace(report, limit_um=scene.limit_um, smallest_set=smallest)
     return report
 
 
@@ -292,13 +384,14 @@ def find_factor(
     """
     if worst.high_um <= limit_um:
         return 1.0
-    low, high, factor = 0.0, 1.0, None
-    for step in range(FACTOR_STEPS):
-        watch(0.3 + 0.3 * step / FACTOR_STEPS)
+    low, high, factor, steps = 0.0, 1.0, None, 0
+    while high - low > (FACTOR_STEP * low or MIN_FACTOR):
+        steps += 1
+        watch(0.4 + 0.1 * (1.0 - 0.8**steps))
         middle = (low + high) / 2.0
         scaled = [replace(each, limit=middle * each.limit) for each in constraints]
         try:
-            largest = curves.find_largest(scaled, lambda _: watch(0.3), limit_um=limit_um)
+            largest = curves.find_largest(scaled, lambda _: watch(0.4), limit_um=limit_um)
         except InfeasibleError:
             low = middle
             continue

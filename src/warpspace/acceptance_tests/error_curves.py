@@ -10,11 +10,12 @@ from warpspace.acceptance_tests.polytope import (
     Constraint,
     LargestError,
     Polytope,
+    bound_nodes,
     find_largest_error,
 )
 from warpspace.analysis.description import ProgressCallback
-from warpspace.bench.linear_form import absolute
-from warpspace.bench.plan import BenchPlan, respond
+from warpspace.bench.linear_form import LinearForm, absolute
+from warpspace.bench.plan import BenchPlan, IndexArray, respond
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import build_basis
 from warpspace.field.grid import Grid, build_grid
@@ -24,6 +25,7 @@ from warpspace.scene.model import Scene
 from warpspace.units import Array
 
 MM_PER_M = 1e3
+AT_TOLERANCE = 1e-7  # of the width of a tolerance: a value that reaches it
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,8 @@ class ErrorCurves:
     scene: Scene
     knots: int = 5
     slope: float | None = None  # µm/m or µrad/m; the largest along linear axes
+    second_difference: float | None = None  # µm/m² or µrad/m²; likewise
+    measured: tuple[Constraint, ...] = ()  # what is known of this machine
 
     def __post_init__(self) -> None:
         """Refuse scenes without tolerances."""
@@ -107,13 +111,14 @@ class ErrorCurves:
             basis = build_basis(scene.model, scene.errors, self.keys, at, scene.view(), points)
             return np.moveaxis(basis.position.reshape(len(self.keys), -1, 3), 0, -1)
 
-        return self.responses(respond_nodes)
+        return self.respond(respond_nodes)
 
     def readings(self, plan: BenchPlan) -> Array:
         """Compute the response of the readings of a test to each value, [m, V]."""
-        return self.responses(lambda scene: respond(scene, plan, self.keys))
+        return self.respond(lambda scene: respond(scene, plan, self.keys))
 
-    def responses(self, evaluate: Callable[[Scene], Array]) -> Array:
+    def respond(self, evaluate: Callable[[Scene], Array]) -> Array:
+        """Compute the response to each value, [..., V], from those to each curve, [..., K]."""
         columns = {variable: index for index, variable in enumerate(self.variables)}
         responses = np.zeros(0)
         for knot, unit in enumerate(np.eye(self.knots)):
@@ -133,10 +138,13 @@ class ErrorCurves:
         positions = np.linspace(*span, self.knots).tolist()
         return TableCurve(span, tuple(zip(positions, at_knots.tolist(), strict=True)))
 
+    def columns(self, key: str) -> IndexArray:
+        """Return the columns of the values of an error, one per knot."""
+        return np.flatnonzero([name == key for name, _ in self.variables])
+
     def by_key(self, machine: Array) -> dict[str, Array]:
         """Split a machine, [V], into its errors."""
-        keys = np.array([key for key, _ in self.variables])
-        return {key: machine[keys == key] for key in self.keys}
+        return {key: machine[self.columns(key)] for key in self.keys}
 
     def build_scene(self, machine: Array) -> Scene:
         """Return the scene of one machine, [V]."""
@@ -144,22 +152,70 @@ class ErrorCurves:
         return replace(self.scene, errors=ErrorSet(curves))
 
     def polytope(self, constraints: Sequence[Constraint]) -> Polytope:
-        """Build the polytope of the machines that pass tests."""
-        slopes = () if self.slope is None else (self._slope_limit(self.slope),)
-        return Polytope(self.lower, self.upper, [*slopes, *constraints])
+        """Build the polytope of the machines that pass tests and agree with measurements."""
+        curves = [
+            Constraint(name, self._differences(np.array(weights)), limit)
+            for name, limit, weights in (
+                ("slope", self.slope, [-1.0, 1.0]),
+                ("second difference", self.second_difference, [1.0, -2.0, 1.0]),
+            )
+            if limit is not None
+        ]
+        return Polytope(self.lower, self.upper, [*curves, *self.measured, *constraints])
 
     def find_largest(
-        self, constraints: Sequence[Constraint], watch: ProgressCallback, limit_um: float = np.inf
+        self,
+        constraints: Sequence[Constraint],
+        watch: ProgressCallback,
+        limit_um: float = np.inf,
+        stop_um: float = np.inf,
     ) -> LargestError:
-        return find_largest_error(self.polytope(constraints), self.gains, watch, limit_um)
+        polytope = self.polytope(constraints)
+        bounds = self._node_bounds
+        return find_largest_error(polytope, self.gains, watch, limit_um, stop_um, bounds)
 
-    def _slope_limit(self, slope: float) -> Constraint:
+    @cached_property
+    def _node_bounds(self) -> Array:
+        return bound_nodes(self.lower, self.upper, self.gains)
+
+    def find_ranges(
+        self, constraints: Sequence[Constraint], watch: ProgressCallback
+    ) -> dict[str, tuple[float, float]]:
+        """Find the lowest and the highest value of each error at its knots, µm or µrad.
+
+        A vertex found for one value is a machine for all others: a value that already reaches its
+        tolerance needs no linear program.
+        """
+        polytope = self.polytope(constraints)
+        first = polytope.maximise(np.zeros(len(self.upper))).point
+        lowest, highest = first.copy(), first.copy()
+        widths = self.upper - self.lower
+        ranges: dict[str, tuple[float, float]] = {}
+        for number, key in enumerate(self.keys):
+            at = self.columns(key)
+            for sign in (1.0, -1.0):
+                for column in at:
+                    watch(number / len(self.keys))
+                    room = (
+                        np.maximum(self.upper - highest, 0.0) if sign > 0 else lowest - self.lower
+                    )
+                    if room[at].min() <= AT_TOLERANCE * widths[column]:
+                        break
+                    cost = sign * np.eye(1, len(widths), column)[0]
+                    point = polytope.maximise(cost).point
+                    lowest, highest = np.minimum(lowest, point), np.maximum(highest, point)
+            ranges[key] = float(lowest[at].min()), float(highest[at].max())
+        return ranges
+
+    def _differences(self, weights: Array) -> LinearForm:
+        """Build the form of the largest divided difference of neighbouring knots, per m or m²."""
+        order = len(weights) - 1
         rows = [np.zeros((0, len(self.variables)))]
         for index, (key, knot) in enumerate(self.variables):
             axis = parameter(key).axis
-            if knot and is_linear(axis):
+            if knot >= order and is_linear(axis):
                 low, high = self.scene.axis_span(axis)
                 row = np.zeros((1, len(self.variables)))
-                row[0, [index - 1, index]] = -1.0, 1.0
-                rows.append(row * MM_PER_M * (self.knots - 1) / (high - low))
-        return Constraint("slope", absolute(*rows), slope)
+                row[0, index - order : index + 1] = weights
+                rows.append(row * (MM_PER_M * (self.knots - 1) / (high - low)) ** order)
+        return absolute(*rows)

@@ -105,7 +105,7 @@ class PartModel:
             linear[:] = inspection.linearise_measures(features, chosen, moves)
             return np.concatenate([np.zeros((0, len(moves))), *(x.rows for x in linear if x)])
 
-        rows, self.linear = curves.responses(respond), dict[MeasureKey, LinearMeasure]()
+        rows, self.linear = curves.respond(respond), dict[MeasureKey, LinearMeasure]()
         for measure, each in zip(chosen, linear, strict=True):
             if each is not None:
                 self.linear[measure] = each._replace(rows=rows[: len(each.rows)])

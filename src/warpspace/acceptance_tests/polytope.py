@@ -1,6 +1,6 @@
 """Machines that pass tests as a polytope, and the largest error vector over it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from heapq import heapify, heappop, heappush
@@ -28,19 +28,23 @@ class InfeasibleError(OptionError):
 
 @dataclass(frozen=True)
 class Constraint:
-    """A test and its limit: the size of its form is at most the limit."""
+    """A test and its limit: the size of its form, about the target, is at most the limit."""
 
     name: str
     form: LinearForm  # of the values of errors: rows [n, V]
     limit: float  # µm or µrad
     quantity: str = ""
+    target: Array | float = 0.0  # [n]; subtracted from the rows: estimates
+    # (f,); names of the unknowns of the form; equal names of several constraints are one unknown
+    unknowns: tuple[str, ...] = ()
 
 
 class Vertex(NamedTuple):
     """Largest value of a linear functional over a polytope, with the proof that it is largest.
 
     For any cost vector c, ``offset + max over the box of (c − gradient) · v`` is an upper bound of
-    c · v over the polytope (weak duality).
+    c · v over the polytope (weak duality): rows R and duals y give the gradient y·R, rows within
+    target ± 1 the offset Σ (y·target + |y|).
     """
 
     point: Array  # [V], µm or µrad
@@ -58,17 +62,21 @@ class Polytope:
 
     def __init__(self, lower: Array, upper: Array, constraints: Sequence[Constraint]) -> None:
         self.lower, self.upper = lower, upper
-        column = len(lower)
-        width = column + sum(each.form.free.shape[1] for each in constraints)
-        blocks = [np.zeros((0, width))]
-        for form, limit in ((each.form, each.limit) for each in constraints):
-            block = np.zeros((len(form.rows), width))
-            block[:, : len(lower)] = form.rows
-            block[:, column : column + form.free.shape[1]] = -form.free
-            column += form.free.shape[1]
-            block *= form.factor / limit  # within ± 1
+        columns: dict[Hashable, int] = {}
+        for number, each in enumerate(constraints):
+            for name in _unknowns(number, each):
+                columns.setdefault(name, len(lower) + len(columns))
+        width = len(lower) + len(columns)
+        blocks = [np.zeros((0, width + 1))]
+        for number, each in enumerate(constraints):
+            block = np.zeros((len(each.form.rows), width + 1))
+            block[:, : len(lower)] = each.form.rows
+            block[:, [columns[name] for name in _unknowns(number, each)]] = -each.form.free
+            block[:, -1] = each.target
+            block *= each.form.factor / each.limit  # within the target ± 1
             blocks.append(block[np.unique(np.round(block, 9), axis=0, return_index=True)[1]])
-        self._rows = np.concatenate(blocks)
+        self._rows, self._target = np.split(np.concatenate(blocks), [width], axis=1)
+        self._target = self._target[:, 0]
         if len(self._rows) > MAX_ROWS:
             raise OptionError(f"the tests have {len(self._rows):,} rows; expected {MAX_ROWS:,}")
         self._test = np.repeat(np.arange(len(blocks)), [len(block) for block in blocks])
@@ -85,7 +93,7 @@ class Polytope:
 
     @property
     def is_symmetric(self) -> bool:
-        return bool(np.allclose(self.lower, -self.upper))
+        return not self._target.any() and bool(np.allclose(self.lower, -self.upper))
 
     def maximise(self, cost: Array) -> Vertex:
         """Find the vertex with the largest cost · machine; raise InfeasibleError without any."""
@@ -97,14 +105,15 @@ class Polytope:
                 raise InfeasibleError("no machine within the tolerances passes all tests")
             solution = self._solver.getSolution()
             point = np.array(solution.col_value)
-            excess = np.abs(self._rows @ point) - 1.0
+            excess = np.abs(self._rows @ point - self._target) - 1.0
             excess[self._added] = 0.0
             if excess.max(initial=0.0) <= FEASIBLE:
                 break
             self._add_violated(excess)
         dual = np.array(solution.row_dual)
         gradient = dual @ self._rows[self._added, :count]
-        return Vertex(point[:count], float(cost @ point[:count]), gradient, np.abs(dual).sum())
+        offset = float(np.abs(dual).sum() + dual @ self._target[self._added])
+        return Vertex(point[:count], float(cost @ point[:count]), gradient, offset)
 
     def _solve(self, anew: bool = False) -> bool:
         """Run the solver; anew where the basis of the solution before leads nowhere."""
@@ -131,11 +140,15 @@ class Polytope:
         block = self._rows[chosen]
         row, column = np.nonzero(block)
         starts = np.searchsorted(row, np.arange(len(chosen))).astype(np.int32)
-        ones, columns = np.ones(len(chosen)), column.astype(np.int32)
+        target, columns = self._target[chosen], column.astype(np.int32)
         self._solver.addRows(
-            len(chosen), -ones, ones, len(row), starts, columns, block[row, column]
+            len(chosen), target - 1.0, target + 1.0, len(row), starts, columns, block[row, column]
         )
         self._added = np.append(self._added, chosen)
+
+
+def _unknowns(number: int, constraint: Constraint) -> Sequence[Hashable]:
+    return constraint.unknowns or [(number, k) for k in range(constraint.form.free.shape[1])]
 
 
 @cache
@@ -182,12 +195,14 @@ class LargestError:
 
 
 class _LargestErrorSearch:
-    def __init__(self, polytope: Polytope, gains: Array, limit_um: float) -> None:
-        self.polytope, self.gains, self.limit_um = polytope, gains, limit_um
+    def __init__(self, polytope: Polytope, gains: Array, limit_um: float, stop_um: float) -> None:
+        self.polytope, self.gains, self.limit_um, self.stop_um = polytope, gains, limit_um, stop_um
         self.best = LargestError(0.0, 0.0, 0, np.zeros(gains.shape[2]), np.zeros(3))
 
     @property
     def threshold_um(self) -> float:
+        if self.best.low_um > self.stop_um:
+            return np.inf
         if np.isinf(self.limit_um):
             return (1.0 + GAP) * self.best.low_um
         return np.inf if self.best.low_um > CLOSE * self.limit_um else self.limit_um
@@ -255,11 +270,22 @@ class _LargestErrorSearch:
         return -queue[0][0]
 
 
+def bound_nodes(lower: Array, upper: Array, gains: Array) -> Array:
+    """Compute upper bounds of |E| at nodes, [N], by the tolerances alone."""
+    triangles, box = icosahedron(), Polytope(lower, upper, ())
+    heights = np.stack([box.bounds(triangles @ each) for each in gains])
+    return np.array(
+        [max(cone_bound(t, h) for t, h in zip(triangles, each, strict=True)) for each in heights]
+    )
+
+
 def find_largest_error(
     polytope: Polytope,
     gains: Array,
     watch: Callable[[float], None],
     limit_um: float = np.inf,
+    stop_um: float = np.inf,
+    bounds: Array | None = None,
 ) -> LargestError:
     """Find the largest |E| over nodes and machines, with bounds that differ by at most `GAP`.
 
@@ -272,6 +298,10 @@ def find_largest_error(
     limit_um : float, optional
         Limit to be decided upon: the upper bound is at most the limit, or infinite where a machine
         exceeds `CLOSE` of it.
+    stop_um : float, optional
+        Size of an error at which the search ends: the upper bound is infinite then.
+    bounds : ndarray, [N], µm, optional
+        `bound_nodes` of the box and the gains, where they are known.
 
     Notes
     -----
@@ -282,12 +312,8 @@ def find_largest_error(
     direction becomes that of its error vector. Nodes, and corners of triangles, whose bound by
     tolerances alone is small enough are not solved.
     """
-    search, high = _LargestErrorSearch(polytope, gains, limit_um), 0.0
-    triangles = icosahedron()
-    heights = np.stack([polytope.bounds(triangles @ each) for each in gains])
-    bounds = np.array(
-        [max(cone_bound(t, h) for t, h in zip(triangles, each, strict=True)) for each in heights]
-    )
+    search, high = _LargestErrorSearch(polytope, gains, limit_um, stop_um), 0.0
+    bounds = bound_nodes(polytope.lower, polytope.upper, gains) if bounds is None else bounds
     for done, node in enumerate(np.argsort(-bounds)):
         if bounds[node] <= max(search.threshold_um, high):
             break

@@ -33,7 +33,7 @@ from warpspace.calibration.instruments import (
 )
 from warpspace.calibration.next_best import find_separating, next_best, observability, u95_at
 from warpspace.calibration.readings import Readings
-from warpspace.calibration.registry import read_readings
+from warpspace.calibration.registry import pair_kinds, read_readings
 from warpspace.calibration.solve import CheckCancelled, never_cancelled, read_keys, rms_mm
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.scene.model import Scene
@@ -122,12 +122,7 @@ class Calibrate(Analysis):
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> Calibration:
         names = (*self.data, *self.predict)
-        kinds = self.kinds if len(self.kinds) > 1 else (self.kinds or (None,)) * len(names)
-        if len(kinds) != len(names):
-            raise OptionError(
-                f"{len(kinds)} values of {{kinds}} for {len(names)} files; expected 1 or"
-                f" {len(names)}"
-            )
+        kinds = pair_kinds(names, self.kinds)
         sets = [
             read_readings(name, scene, kind, self.frame)
             for name, kind in zip(names, kinds, strict=True)

@@ -1,6 +1,6 @@
 """Registry of the kinds of measurement: a new kind is a module and a line below."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -154,6 +154,16 @@ def recognise(table: ReadingTable, scene: Scene) -> MeasurementKind:
     columns = ", ".join((*table.labels, *table.columns))
     kinds = "; ".join(f"{kind.name}: {kind.columns}" for kind in KINDS.values())
     raise SceneError(table.source, [f"has columns {columns}; expected those of a kind: {kinds}"])
+
+
+def pair_kinds(names: Sequence[str], kinds: Sequence[str]) -> Sequence[str | None]:
+    """Return the stated kind of each file, from one for all or one each; None without any."""
+    paired = kinds if len(kinds) > 1 else (*kinds, None)[:1] * len(names)
+    if len(paired) != len(names):
+        raise OptionError(
+            f"{len(paired)} values of {{kinds}} for {len(names)} files; expected 1 or {len(names)}"
+        )
+    return paired
 
 
 def read_readings(

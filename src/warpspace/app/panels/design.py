@@ -298,6 +298,12 @@ class AcceptancePanel(AnalysisPanel):
 
     sentence = "The worst machine within tolerance that still passes its acceptance tests"
     run_label = "Find the worst machine"
+    unsupported = ("kinds",)  # readings are fitted first: a calibrated scene is a measured one
+
+    def shown_options(self, state: AppState) -> Sequence[Option]:
+        """Offer the uncertainty of the errors where the scene states it."""
+        is_stated = bool(state.scene.covariance or state.scene.uncertainty)
+        return [option for option in self.options() if is_stated or option.name != "measured"]
 
     def inputs(self, state: AppState) -> Mapping[str, Any]:
         return {"plan": option_values(state, self.name).get("plan") or None}
