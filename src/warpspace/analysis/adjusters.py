@@ -10,7 +10,7 @@ from warpspace.exceptions import OptionError
 from warpspace.kinematics.chain import branch_frames
 from warpspace.kinematics.model import AxisFrames, Model
 from warpspace.machine.adjusters import FRAME, Adjuster, AdjusterKind, rigid_map, support_rows
-from warpspace.machine.axes import Parameter, axis_parameters, direction_index, is_linear, parameter
+from warpspace.machine.axes import Parameter, axis_parameters, is_linear, parameter
 from warpspace.machine.curves.curve import OWN_AXIS, Span
 from warpspace.machine.curves.polynomial_pieces import fit_curves
 from warpspace.machine.definition import URAD_PER_UM_OVER_MM
@@ -37,12 +37,12 @@ class Motion(NamedTuple):
 def adjuster_effects(scene: Scene, factors: Mapping[str, float] | None = None) -> list[ErrorSet]:
     """Compute the errors that each adjuster of a machine adds per unit of its change.
 
-    Three or more supports under the guides of an axis move it as a rigid body: its constant errors
-    change. The zero point of a linear axis takes up its shift, along its travel that at position 0. Bolts along a
-    guide also bend it by the natural cubic spline through them, linear beyond its ends; between two
-    rows it is linear. Gibs turn and shift the carriage. Supports of the bed move everything
-    together; if they are more than three, they also bend it by such a surface, less its plane of
-    best fit, and with it the guides that lie on it and the location of other first axes.
+    Three or more supports under the guides of an axis move it as a rigid body: its orientation
+    changes; its shift is taken up by zero points and rotary centres. Bolts along a guide also bend
+    it by the natural cubic spline through them, linear beyond its ends and between two rows. Gibs
+    turn and shift the carriage. Supports of the bed move everything together; more than three also
+    bend it by such a surface, less its plane of best fit: guides on it are bent, other first axes
+    turned. Carriages stand at the origins of their frames; their shift at position 0 is taken up.
 
     Parameters
     ----------
@@ -140,14 +140,6 @@ def _frames(model: Model, axis: str, position: Array) -> AxisFrames:
     return next(frames for frames in branch_frames(model, side, at) if frames.axis.name == axis)
 
 
-def _is_zero_point(row: Parameter) -> bool:
-    """Check for a shift that the zero point of an axis takes up."""
-    along = direction_index(row.axis)
-    return (
-        row.is_constant and not row.is_rotation and (is_linear(row.axis) or row.direction == along)
-    )
-
-
 def _project(scene: Scene, motion: Motion, frames: AxisFrames, rows: Sequence[Parameter]) -> Array:
     """Split a motion of a body into errors of an axis, [..., K], µm and µrad."""
     columns: list[Array] = []
@@ -160,7 +152,7 @@ def _project(scene: Scene, motion: Motion, frames: AxisFrames, rows: Sequence[Pa
 
 def _constant_errors(scene: Scene, axis: str, motion: Motion) -> dict[str, ErrorFunction]:
     """Return the constant errors of an axis whose guide moves."""
-    rows = [row for row in axis_parameters(axis) if row.is_constant and not _is_zero_point(row)]
+    rows = [row for row in axis_parameters(axis) if row.is_constant and row.is_rotation]
     values = _project(scene, motion, _frames(scene.model, axis, np.zeros(())), rows)
     travel = scene.machine.axes[axis].travel
     pairs = zip(rows, values.reshape(-1), strict=True)

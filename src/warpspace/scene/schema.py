@@ -385,6 +385,14 @@ def _band(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
     return -half_width, half_width
 
 
+def _before(reader: ValueReader, value: Any, path: Path) -> str | dict[str, float]:
+    if isinstance(value, str):
+        return _text(MAX_FILE_NAME, 1)(reader, value, path)
+    return _by_name(_number(-limits.MAX_ERROR, limits.MAX_ERROR))(reader, value, path)
+
+
+_DONE = TableSchema({"acts": (_by_name(LENGTH), MISSING), "before": (_before, MISSING)})
+DONE_ACTS = TableSchema({"done": (_list(_DONE, limits.MAX_NOTES), ())})
 LEAST_SQUARES, EXTREME_FITS = "least squares", ("inscribed", "circumscribed")
 FITS = LEAST_SQUARES, "minimum zone", *EXTREME_FITS
 _FEATURE = TableSchema(
