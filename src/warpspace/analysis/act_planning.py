@@ -8,7 +8,6 @@ import numpy as np
 
 from warpspace.analysis.adjusters import add_effects, adjuster_effects
 from warpspace.analysis.adjustment_search import SILENT, Objective, StepSearch, Volume
-from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorBasis, View
 from warpspace.field.grid import Grid
 from warpspace.machine.adjusters import Adjuster, spell_act

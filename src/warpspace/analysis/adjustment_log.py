@@ -1,6 +1,6 @@
 """Logs of adjustments: acts with the errors before them, and the stiffness they reveal."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -146,8 +146,12 @@ def total_changes(adjusters: Sequence[Adjuster], entries: Sequence[DoneActs]) ->
     }
 
 
-def log_entry(scene: Scene, acts: Sequence[Act], keys: Sequence[str]) -> str:
-    """Write acts and the present values of constant errors as a ``[[done]]`` table."""
+def extend_log(file: str, scene: Scene, acts: Sequence[Act], keys: Iterable[str]) -> str:
+    """Write a log with acts and the present values of the constant errors that they change."""
     before = {k: scene.errors.amplitude(k) for k in keys if parameter(k).is_constant}
     changes = {act.adjuster: act.change for act in acts}
-    return spell_section("[done]", {"acts": changes, "before": before})
+    entry = spell_section("[done]", {"acts": changes, "before": before})
+    if not Path(file).exists():
+        return entry
+    read_log(file, scene)
+    return f"{read_text(Path(file), MAX_SCENE_BYTES).rstrip()}\n\n{entry}".lstrip()

@@ -120,7 +120,8 @@ def _runner(kind: "type[Analysis]", run_analysis: Callable[..., Any] | None) -> 
             print_json(document | ({"files": written_files} if "files" in document else {}))
             return
         print_blocks(result.blocks())
-        for path in filter(None, (*(written_files or [output]), csv_path, plot)):
+        updated = result.updated_files()
+        for path in filter(None, (*(written_files or [output]), csv_path, plot, *updated)):
             echo(f"wrote {path}")
 
     return run
@@ -195,6 +196,7 @@ def write_result(
         draw = resolve_name(result.drawn_by) if result.drawn_by else result_chart
         files[plot] = encode_figure(draw(result), Path(plot).suffix.lower().lstrip("."))
     write_texts(files, force=force)
+    write_texts(dict(result.updated_files()), force=True)
     return written_files
 
 

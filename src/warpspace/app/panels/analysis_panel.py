@@ -94,7 +94,9 @@ class AnalysisPanel(Section):
 
     def options(self) -> Sequence[Option]:
         options = [o for o in self.kind.options() if o.name not in self.unsupported]
-        return [o for o in options if not (o.grammar and o.grammar.is_file)]
+        return [
+            o for o in options if not (o.grammar and (o.grammar.is_file or o.grammar.is_output))
+        ]
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
         return self.options()
