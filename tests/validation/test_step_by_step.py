@@ -70,7 +70,8 @@ def cycles(rng, log, *, at_once):
         if volume_statistics(evaluate_grid(actual, grid, BASE.view()), grid).max_um <= LIMIT_UM:
             return cycle
         noisy = {
-            key: Constant((0.0, 1.0), errors.amplitude(key) + rng.normal(0.0, U_URAD)) for key in KEYS
+            key: Constant((0.0, 1.0), errors.amplitude(key) + rng.normal(0.0, U_URAD))
+            for key in KEYS
         }
         measured = replace(BASE, errors=ErrorSet(noisy))
         plan = Adjust(
@@ -101,6 +102,6 @@ def test_all_acts_at_once_with_learned_stiffness_halve_the_cycles(count, tmp_pat
         ]
     )
     planned, single = numbers.mean(axis=0)
-    print(f"cycles: {planned:.2f} planned, {single:.2f} one act at a time")  # noqa: T201
+    print(f"cycles: {planned:.2f} planned, {single:.2f} one act at a time")
     assert numbers[:, 0].max() < MOST_CYCLES
     assert planned <= 0.5 * single

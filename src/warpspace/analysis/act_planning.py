@@ -1,6 +1,6 @@
 """Plans of acts: whole steps of a few adjusters that reduce the volumetric error."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
@@ -52,6 +52,7 @@ class Planner:
     view: View
     factors: Mapping[str, float]  # effect of adjusters relative to the geometric one
     done: Mapping[str, float]  # changes of adjusters so far
+    excluded: Collection[str] = ()  # errors that are not evaluated
 
     def members_of_acts(self) -> dict[str, tuple[int, ...]]:
         """List the adjusters of each possible act: one, or those of a group."""
@@ -77,7 +78,10 @@ class Planner:
         that have no effect in this view.
         """
         scene, adjusters = self.scene, self.scene.machine.adjusters
-        effects = adjuster_effects(scene, self.factors)
+        effects = [
+            ErrorSet({k: f for k, f in effect.functions.items() if k not in self.excluded})
+            for effect in adjuster_effects(scene, self.factors)
+        ]
         fields = np.array(
             [
                 adjuster.step

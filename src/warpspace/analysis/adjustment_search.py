@@ -407,7 +407,7 @@ class StepSearch:
                 np.append(high, [*np.ones(len(low)), np.inf]),
             ),
             constraints=[c for c in conditions if c.A.size],
-            options={"mip_rel_gap": 1e-9},
+            options={"presolve": False, "mip_rel_gap": 1e-9},
         )
         if solution.x is None:
             return np.zeros(len(low)), np.inf

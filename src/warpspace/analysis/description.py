@@ -54,6 +54,7 @@ class Change:
 
     label: str
     scene: "Scene"
+    steps: tuple[str, ...] = ()  # to carry out, where they are more than changes of errors
 
 
 @dataclass(frozen=True, kw_only=True)

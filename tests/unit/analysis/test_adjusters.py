@@ -1,7 +1,7 @@
 """Adjusters: effects in closed form, plans against exhaustive search, invalid descriptions."""
 
 from dataclasses import replace
-from itertools import combinations, product
+from itertools import product
 
 import numpy as np
 import pytest
@@ -258,7 +258,7 @@ def test_an_act_that_would_leave_a_tolerance_is_not_proposed():
         support(f"foot {n}", "Z", at, FOOT.replace("1.0", "0.01")) for n, at in enumerate(THREE)
     ]
     errors = "[errors]\nEA0Z = 100\n[tolerances]\nEB0Z = 1e-3\n"
-    free = Adjust(grid=3, count=1).run(scene_of(*feet, errors=errors.split("[tol")[0]))
+    free = Adjust(grid=3, count=1).run(scene_of(*feet, errors=errors.partition("[tol")[0]))
     bound = Adjust(grid=3, count=1).run(scene_of(*feet, errors=errors))
     assert abs(free.adjustments[0].adjust["EB0Z"]) > 1e-3
     assert not bound.adjustments

@@ -280,7 +280,8 @@ class Adjust(description.Analysis):
         stiffness = learn_stiffness(scene, entries, self.done or "")
         factors = {name: learnt.factor for name, learnt in stiffness.items()}
         done = total_changes(scene.machine.adjusters, entries)
-        most, idle, plans = Planner(scene, grid, view, factors, done).plan(
+        excluded = {*scene.parameter_keys} - {*self.included(scene)}
+        most, idle, plans = Planner(scene, grid, view, factors, done, excluded).plan(
             error_um,
             self.objective,
             self.count if error_um.any() else 0,
@@ -383,7 +384,9 @@ class AdjustResult(description.Result):
     def changes(self) -> Sequence[description.Change]:
         return [
             description.Change(
-                f"after adjustment: {adjusted.label}", adjusted.applied_to(self.scene)
+                f"after adjustment: {adjusted.label}",
+                adjusted.applied_to(self.scene),
+                tuple(map(str, adjusted.acts)) if isinstance(adjusted, ActSet) else (),
             )
             for adjusted in self.adjustments
         ]

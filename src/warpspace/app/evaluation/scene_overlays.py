@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpspace.acceptance_tests.acceptance import Acceptance
 from warpspace.acceptance_tests.plans import default_plan, load_plan
+from warpspace.analysis.commands.adjust import Adjust
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import TEST, option_values, read_form
@@ -167,6 +168,19 @@ def plan_test(test: BenchTest, scene: Scene) -> BenchPlan:
             f"{len(plan.point_mm):,} places; expected at most {MOST_SITES:,} in the app"
         )
     return plan
+
+
+def planned_adjusters(state: AppState) -> list[tuple[str, Array, Array]]:
+    """List the acts drawn while *Adjustment* is open: text, place, [3], mm, and direction, [3]."""
+    page = state.page
+    if page.task != Adjust.task or Adjust.name not in page.open:
+        return []
+    return [
+        (str(act), np.array(member.at_mm), np.sign(act.change) * np.array(member.direction))
+        for act in page.acts
+        for member in act.members
+        if member in state.scene.machine.adjusters and not member.kind.is_parameter
+    ]
 
 
 def planned_tests(state: AppState) -> str | None:

@@ -333,7 +333,7 @@ def _change_html(state: AppState, change: Change) -> Markup:
         if abs(b - a) > SAME:
             line = f"{key} {number(a)} → {number(b)} {parameter(key).unit}"
             moved.append((-abs(b - a), line))
-    steps = [line for _, line in sorted(moved)] or [change.label]
+    steps = [*change.steps, *(line for _, line in sorted(moved))] or [change.label]
     try:
         before, after = (PLAIN.evaluate(state).statistics for state in (before_state, after_state))
     except WarpspaceError:
