@@ -91,8 +91,9 @@ class Planner:
         )
         acts = self.members_of_acts()
         response = np.array([fields[list(members)].sum(axis=0) for members in acts.values()])
-        acting = ~is_placement(response) & (np.abs(response).max(axis=(1, 2, 3, 4)) > SILENT)
-        idle = tuple(name for name, acts_too in zip(acts, acting, strict=True) if not acts_too)
+        moves = np.abs(response).max(axis=(1, 2, 3, 4)) > SILENT
+        acting = np.logical_and(moves, np.logical_not(is_placement(response)))
+        idle = tuple(name for name, is_acting in zip(acts, acting, strict=True) if not is_acting)
         acts = {name: members for name, members in acts.items() if name not in idle}
         ranges = np.array([self._steps_left(adjuster) for adjuster in adjusters])
         bounds = np.array(

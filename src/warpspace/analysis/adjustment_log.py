@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -52,12 +52,13 @@ def read_log(file: str, scene: Scene) -> tuple[DoneActs, ...]:
     """Read the acts of a log, ``[[done]]``; raise SceneError with all its problems."""
     path, problems = Path(file), schema.Problems()
     raw = parse_toml(read_text(path, MAX_SCENE_BYTES), file)
-    document = problems.read(schema.DONE_ACTS, "", raw)
+    document: dict[str, Any] | None = problems.read(schema.DONE_ACTS, "", raw)
     adjusters = scene.machine.adjusters
     groups = {name for adjuster in adjusters for name in adjuster.groups}
     names = [*(adjuster.name for adjuster in adjusters), *sorted(groups)]
+    done: list[dict[str, Any]] = [] if document is None else [*document["done"]]
     entries: list[DoneActs] = []
-    for index, entry in enumerate(document["done"] if document else ()):
+    for index, entry in enumerate(done):
         key, before = f"done[{index}]", entry["before"]
         problems.only(f"{key}.acts", entry["acts"], names, "adjuster or group")
         changes: dict[str, float] = {}
@@ -66,14 +67,14 @@ def read_log(file: str, scene: Scene) -> tuple[DoneActs, ...]:
                 if name in (adjuster.name, *adjuster.groups):
                     changes[adjuster.name] = changes.get(adjuster.name, 0.0) + change
         if isinstance(before, str):
-            errors, keys = load_scene(path.parent / before).errors, None
+            state = State(load_scene(path.parent / before).errors, None)
         else:
             allowed = [k for k in scene.machine.allowed_keys if PARAMETERS[k].is_constant]
             problems.only(f"{key}.before", before, allowed, "constant error of this machine")
             values = {k: v for k, v in before.items() if k in allowed}
-            errors = ErrorSet({k: Constant((0.0, 1.0), value) for k, value in values.items()})
-            keys = frozenset(values)
-        entries.append(DoneActs(changes, State(errors, keys)))
+            constants = {k: Constant((0.0, 1.0), value) for k, value in values.items()}
+            state = State(ErrorSet(constants), frozenset(values))
+        entries.append(DoneActs(changes, state))
     if problems.lines:
         raise SceneError(file, problems.lines)
     return tuple(entries)

@@ -6,7 +6,7 @@ from enum import StrEnum
 from functools import cached_property
 from itertools import combinations
 from math import comb
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -385,7 +385,7 @@ class StepSearch:
             heights = -np.einsum("nc,nc->n", self.volume.error_um[worst], unit)
         return value_um, np.column_stack([slopes, -np.ones(len(slopes))]), heights
 
-    def _relaxed(self, size: int, planes: Array, offsets: Array) -> tuple[Array, float]:
+    def _relaxed(self, size: int, planes: Array, offsets: Any) -> tuple[Array, float]:
         """Return the best whole steps for the planes, [A], and the lower bound of the objective."""
         from scipy.optimize import LinearConstraint, milp
 

@@ -102,7 +102,7 @@ def rigid_map(adjusters: Sequence[Adjuster]) -> tuple[Array, Array]:
         The centroid.
     """
     matrix, centre_mm, size_mm = _conditions(adjusters)
-    motion = np.linalg.pinv(matrix, rcond=COLLINEAR)
+    motion: Array = np.asarray(np.linalg.pinv(matrix, rcond=COLLINEAR), dtype=float)
     motion[3:] *= UM_PER_MM / size_mm
     return motion, centre_mm
 

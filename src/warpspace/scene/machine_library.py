@@ -186,7 +186,7 @@ def read_adjusters(
     """Build the adjusters of a machine; note those that are invalid or depend on each other."""
     built: list[adjusters.Adjuster] = []
     for index, table in enumerate(tables):
-        entries = {**table, "kind": adjusters.AdjusterKind(table["kind"])}
+        entries: dict[str, Any] = {**table, "kind": adjusters.AdjusterKind(table["kind"])}
         direction = table["direction"]
         if direction:
             length = sum(part * part for part in direction) ** 0.5

@@ -11,6 +11,7 @@ from warpspace.analysis.adjusters import add_effects, adjuster_effects
 from warpspace.analysis.adjustment_search import Objective, StepSearch, Volume
 from warpspace.analysis.commands.adjust import Adjust
 from warpspace.analysis.statistics import volume_statistics
+from warpspace.bodies.placed import check_adjusters
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.field.evaluate import ErrorBasis
 from warpspace.field.grid import build_grid
@@ -371,3 +372,17 @@ def test_a_log_is_extended_by_the_proposed_acts(tmp_path):
     assert {learnt.adjuster, other.adjuster} == {
         "front left column bolt", "front right column bolt",
     }  # fmt: skip
+
+
+def test_check_lists_adjusters_outside_the_meshes_they_lie_between():
+    model = load_scene("dvf5000_first").model
+    assert check_adjusters(model) == ()
+    machine = model.machine
+    moved = [replace(a, at_mm=(a.at_mm[0], 2000.0, a.at_mm[2])) for a in machine.adjusters]
+    model = replace(model, machine=replace(machine, adjusters=(*machine.adjusters[1:], moved[0])))
+    (problem,) = check_adjusters(model)
+    assert problem.startswith(
+        "adjuster front left foot: at_mm = [-520.0, 2000.0, -545.0] is outside"
+    )
+    assert "y" in problem
+    assert "-620…1250" in problem
