@@ -81,7 +81,9 @@ def test_the_selected_acts_are_drawn_at_their_adjusters_while_the_section_is_ope
     assert [(text, tuple(at)) for text, at, _ in placed] == [
         (str(act), member.at_mm) for act in best.acts for member in act.members
     ]
-    assert all(tuple(way) == member.direction for (*_, way), member in zip(placed, members, strict=True))
+    assert all(
+        tuple(way) == member.direction for (*_, way), member in zip(placed, members, strict=True)
+    )
     shapes = draw_surroundings(LIVE.evaluate(state))
     assert len(shapes["/adjusters/arrows"].assigned["points"]) == len(members) * (1 + STROKES)
     previewed = part.handle(state, do.Preview("adjust", 0))

@@ -124,13 +124,24 @@ def _bent(members: Sequence[Adjuster], travel_um: Array, origin_mm: Array) -> Mo
 
 
 def _spline(at: Array, height: Array, place: Array) -> tuple[Array, Array]:
-    """Evaluate the natural cubic spline through supports, and its slope; linear beyond them."""
-    from scipy.interpolate import CubicSpline
+    """Evaluate the natural cubic spline through supports, and its slope; linear beyond them.
 
-    spline = CubicSpline(at, height, bc_type="natural")
+    Moments m, the second derivatives at the supports, continue the slope: with intervals h,
+    h₋ m₋ + 2 (h₋ + h₊) m + h₊ m₊ = 6 (Δ₊ / h₊ − Δ₋ / h₋), and m is zero at both ends.
+    """
+    width, rise = np.diff(at), np.diff(height) / np.diff(at)
+    moment = np.zeros(len(at))
+    if len(at) > 2:
+        inner = width[1:-1]
+        matrix = np.diag(2.0 * (width[:-1] + width[1:])) + np.diag(inner, 1) + np.diag(inner, -1)
+        moment[1:-1] = np.linalg.solve(matrix, 6.0 * np.diff(rise))
     inside = np.clip(place, at[0], at[-1])
-    slope = np.asarray(spline(inside, 1), dtype=float)
-    return np.asarray(spline(inside), dtype=float) + slope * (place - inside), slope
+    left = np.clip(np.searchsorted(at, inside, "right") - 1, 0, len(width) - 1)
+    h, d, m, n = width[left], inside - at[left], moment[left], moment[left + 1]
+    start = rise[left] - h * (2.0 * m + n) / 6.0
+    slope = start + d * m + d * d * (n - m) / (2.0 * h)
+    value = height[left] + d * (start + d * (m / 2.0 + d * (n - m) / (6.0 * h)))
+    return value + slope * (place - inside), slope
 
 
 def _frames(model: Model, axis: str, position: Array) -> AxisFrames:

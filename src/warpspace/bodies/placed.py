@@ -9,7 +9,7 @@ import numpy as np
 
 from warpspace.bodies.frame import generate_bodies
 from warpspace.bodies.mesh import Body
-from warpspace.bodies.mesh_files import machine_meshes
+from warpspace.bodies.mesh_files import check_meshes, machine_meshes
 from warpspace.bodies.schematic import BODY_FILE, build_layout, read_bodies
 from warpspace.bodies.shading import ShadedSurface, shade_bodies
 from warpspace.field.evaluate import View, find_placement, placement_effect
@@ -31,6 +31,11 @@ def load_bodies(machine: Machine) -> tuple[Body, ...]:
     meshes = machine_meshes(machine)
     bodies = [body for body in schematic or generate_bodies(machine) if body.frame not in meshes]
     return tuple(body for body in (*bodies, *meshes.values()) if body.frame in frames)
+
+
+def check_bodies(model: Model) -> tuple[str, ...]:
+    """List problems of the meshes of a machine, and of the adjusters between them."""
+    return (*check_meshes(model.machine), *check_adjusters(model))
 
 
 def check_adjusters(model: Model) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from warpspace import evaluate
 from warpspace.analysis.adjusters import add_effects, adjuster_effects
@@ -110,6 +111,22 @@ def test_bolts_bend_a_guide_as_the_natural_spline_through_them():
     assert set(effect.functions) == {"EZX", "EBX"}
     assert effect.evaluate("EZX", q) == pytest.approx(height, abs=1e-9)
     assert effect.evaluate("EBX", q) == pytest.approx(-1000.0 * slope, abs=1e-8)
+
+
+def test_a_guide_on_many_bolts_is_the_spline_of_a_second_implementation():
+    bolt = 'kind = "rail bolt"\ndirection = [0, 0, 1]\nstep = 0.01\nrange = [-1, 1]'
+    at = np.array([-350.0, -200.0, -120.0, 60.0, 270.0, 330.0])
+    bolts = [support(str(x), "X", (x, 20.0, 300.0), bolt) for x in at.tolist()]
+    scene = scene_of(*bolts)
+    travel = np.array([3.0, -2.0, 5.0, 1.0, 0.0, -4.0])
+    errors = add_effects(scene, adjuster_effects(scene), (travel / 1000.0).tolist())
+    q = np.linspace(-340.0, 310.0, 40)
+    second = CubicSpline(at, travel, bc_type="natural")
+    # the tilt of the guide is a constant error, which turns the carriage as well
+    pitch = errors.evaluate("EBX", q) + errors.amplitude("EB0X")
+    assert pitch == pytest.approx(-1000.0 * second(10.0 + q, 1), abs=1e-8)
+    straight = errors.evaluate("EZX", q) - 1e-3 * errors.amplitude("EB0X") * q
+    assert straight == pytest.approx(second(10.0 + q) - second(10.0), abs=1e-8)
 
 
 def test_two_rows_of_bolts_roll_the_carriage():
@@ -343,6 +360,10 @@ def test_stiffness_is_the_bayes_estimate_of_the_change(tmp_path):
     assert learnt.adjuster == "foot 0"
     assert learnt.factor == pytest.approx((1.0 / 0.09 + weights @ [1.2, 1.1]) / precision)
     assert learnt.u95 == pytest.approx(1.96 / precision**0.5)
+    assert result.as_json()["stiffness"] == [
+        {"adjuster": "foot 0", "factor": learnt.factor, "u95": learnt.u95}
+    ]
+    assert "foot 0: effect 1." in " ".join(b for b in result.blocks() if isinstance(b, str))
 
 
 def test_an_unstated_uncertainty_is_refused_and_unknown_names_too(tmp_path):

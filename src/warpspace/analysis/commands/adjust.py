@@ -1,9 +1,9 @@
 """Adjustment: errors to adjust, and their new values, that reduce the volumetric error."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from dataclasses import field as attribute
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -310,13 +310,18 @@ class Adjust(description.Analysis):
                 )
             )
         keys = dict.fromkeys(key for adjusted in sets for key in adjusted.adjust)
-        return replace(
+        planned = replace(
             result,
             adjustments=tuple(sets),
             adjustable=most,
             present={key: scene.errors.amplitude(key) for key in keys},
             idle=idle,
             stiffness=tuple(stiffness.values()),
+        )
+        if not entries:
+            return planned
+        return LearnedResult(
+            **{entry.name: getattr(planned, entry.name) for entry in fields(planned)}
         )
 
     def _within_tolerance(
@@ -394,10 +399,6 @@ class AdjustResult(description.Result):
     @property
     def is_acts(self) -> bool:
         return self.analysis.uses_adjusters(self.scene)
-
-    def json_fields(self) -> dict[str, Any]:
-        learned = {"stiffness": description.to_json(self.stiffness)} if self.stiffness else {}
-        return super().json_fields() | learned
 
     def updated_files(self) -> Mapping[str, str]:
         """Return the log with the proposed acts; empty without --log."""
@@ -523,10 +524,12 @@ class AdjustResult(description.Result):
             if f"u95_{name}" in adjusted.expanded_uncertainty:
                 u95 = adjusted.expanded_uncertainty[f"u95_{name}"]
                 after += f" {propagation.plus_minus(u95)}"
-            yield (
-                f"  set {adjusted.size}: {OBJECTIVE_WORDS[self.objective]} {before} → {after} µm;"
-                f" {self._adjustments(adjusted)}"
+            changes = ", ".join(
+                f"{key} {spell_fixed(self.present[key])} → {spell_fixed(new)} {parameter(key).unit}"
+                for key, new in adjusted.adjust.items()
             )
+            objective = OBJECTIVE_WORDS[self.objective]
+            yield f"  set {adjusted.size}: {objective} {before} → {after} µm; {changes}"
         for learnt in self.stiffness:
             yield (
                 f"  {learnt.adjuster}: effect {learnt.factor:.2f} ± {learnt.u95:.2f} (U95) of the"
@@ -580,6 +583,12 @@ class AdjustResult(description.Result):
                 ("best set of adjustments", "set"),
             ),
         )
+
+
+class LearnedResult(AdjustResult):
+    """Acts with the stiffness of adjusters that a log reveals."""
+
+    json_keys = (*AdjustResult.json_keys, "stiffness")
 
 
 def apply_adjustments(scene: Scene, adjust: Mapping[str, float]) -> Scene:
