@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from warpspace.analysis.adjusters import add_effects, adjuster_effects
+from warpspace.analysis.adjuster_effects import add_effects, adjuster_effects
 from warpspace.analysis.commands.adjust import Adjust
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.field.grid import build_grid

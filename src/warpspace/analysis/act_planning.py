@@ -6,7 +6,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from warpspace.analysis.adjusters import add_effects, adjuster_effects
+from warpspace.analysis.adjuster_effects import add_effects, adjuster_effects
 from warpspace.analysis.adjustment_search import SILENT, Objective, StepSearch, Volume
 from warpspace.field.evaluate import ErrorBasis, View
 from warpspace.field.grid import Grid
@@ -91,15 +91,15 @@ class Planner:
         )
         acts = self.members_of_acts()
         response = np.array([fields[list(members)].sum(axis=0) for members in acts.values()])
-        moves = np.abs(response).max(axis=(1, 2, 3, 4)) > SILENT
-        acting = np.logical_and(moves, np.logical_not(is_placement(response)))
-        idle = tuple(name for name, is_acting in zip(acts, acting, strict=True) if not is_acting)
+        largest_um = np.abs(response).max(axis=(1, 2, 3, 4))
+        active = np.logical_and(largest_um > SILENT, np.logical_not(is_placement(response)))
+        idle = tuple(name for name, is_active in zip(acts, active, strict=True) if not is_active)
         acts = {name: members for name, members in acts.items() if name not in idle}
         ranges = np.array([self._steps_left(adjuster) for adjuster in adjusters])
         bounds = np.array(
             [(ranges[list(m), 0].max(), ranges[list(m), 1].min()) for m in acts.values()]
         ).reshape(-1, 2)
-        position = np.concatenate([error_um[None], response[acting]])
+        position = np.concatenate([error_um[None], response[active]])
         basis = ErrorBasis(("present", *acts), self.grid.nominal_mm, position, position)
         volume = Volume(basis, self.grid, np.eye(len(position))[0])
         share = np.array(
@@ -123,15 +123,15 @@ class Planner:
                     if number
                 )
                 errors = add_effects(scene, effects, changes.tolist())
-                after_um = error_um + np.tensordot(steps, response[acting], 1)
+                after_um = error_um + np.tensordot(steps, response[active], 1)
                 yield Plan(chosen, errors, after_um, proven)
 
-        largest = np.abs(bounds).max(axis=1, initial=0.0)
-        most = {
+        largest_steps = np.abs(bounds).max(axis=1, initial=0.0)
+        largest_changes = {
             name: float(number) * adjusters[members[0]].step
-            for (name, members), number in zip(acts.items(), largest, strict=True)
+            for (name, members), number in zip(acts.items(), largest_steps, strict=True)
         }
-        return most, idle, plans()
+        return largest_changes, idle, plans()
 
     def _act(self, name: str, members: Sequence[int], steps: float) -> Act:
         adjusters = tuple(self.scene.machine.adjusters[index] for index in members)
@@ -142,8 +142,8 @@ class Planner:
     def _steps_left(self, adjuster: Adjuster) -> tuple[float, float]:
         done = self.done.get(adjuster.name, 0.0)
         low, high = (end - done for end in adjuster.range)
-        left = replace(adjuster, range=(min(low, 0.0), max(high, 0.0)))
-        return float(left.steps[0]), float(left.steps[1])
+        remaining = replace(adjuster, range=(min(low, 0.0), max(high, 0.0)))
+        return float(remaining.steps[0]), float(remaining.steps[1])
 
     def _tolerance_conditions(self, effects: Sequence[ErrorSet]) -> tuple[Array, Array]:
         """Return the change of each toleranced value by each adjuster, [R, J], and its limits.

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from warpspace.analysis.act_planning import Act
-from warpspace.analysis.adjusters import adjuster_effects
+from warpspace.analysis.adjuster_effects import adjuster_effects
 from warpspace.exceptions import SceneError
 from warpspace.machine.adjusters import Adjuster
 from warpspace.machine.axes import PARAMETERS, parameter

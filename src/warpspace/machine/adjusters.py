@@ -34,7 +34,7 @@ class AdjusterKind(StrEnum):
 
     @property
     def pitches(self) -> tuple[bool, ...]:
-        """Whether it may be without (False) or with (True) a pitch."""
+        """Allowed: without a pitch (False), with one (True), or both."""
         if self in (AdjusterKind.FOOT, AdjusterKind.JACK_SCREW):
             return (True,)
         return (False, True) if self in (AdjusterKind.GIB, AdjusterKind.RAIL_BOLT) else (False,)
@@ -83,9 +83,9 @@ def spell_act(adjuster: Adjuster, name: str, change: float) -> str:
     sign, size = "+" if change > 0.0 else "−", f"{abs(change):.6g}"
     um = "" if adjuster.kind.is_parameter else f" ({abs(change) * adjuster.travel_per_unit:.4g} µm)"
     if adjuster.unit == "turn":
-        whole, part = divmod(Fraction(abs(change)).limit_denominator(MAX_DENOMINATOR), 1)
-        if abs(float(whole + part) - abs(change)) < adjuster.step / 100.0:
-            size = " ".join(str(number) for number in (whole, part) if number)
+        turns, fraction = divmod(Fraction(abs(change)).limit_denominator(MAX_DENOMINATOR), 1)
+        if abs(float(turns + fraction) - abs(change)) < adjuster.step / 100.0:
+            size = " ".join(str(number) for number in (turns, fraction) if number)
     return f"{name} {sign} {size} {adjuster.unit}{um}"
 
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from warpspace import evaluate
-from warpspace.analysis.adjusters import add_effects, adjuster_effects
+from warpspace.analysis.adjuster_effects import add_effects, adjuster_effects
 from warpspace.analysis.adjustment_search import Objective, StepSearch, Volume
 from warpspace.analysis.commands.adjust import Adjust
 from warpspace.analysis.statistics import volume_statistics

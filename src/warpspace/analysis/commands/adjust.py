@@ -281,7 +281,7 @@ class Adjust(description.Analysis):
         factors = {name: learnt.factor for name, learnt in stiffness.items()}
         done = total_changes(scene.machine.adjusters, entries)
         excluded = {*scene.parameter_keys} - {*self.included(scene)}
-        most, idle, plans = Planner(scene, grid, view, factors, done, excluded).plan(
+        largest_changes, idle, plans = Planner(scene, grid, view, factors, done, excluded).plan(
             error_um,
             self.objective,
             self.count if error_um.any() else 0,
@@ -313,7 +313,7 @@ class Adjust(description.Analysis):
         planned = replace(
             result,
             adjustments=tuple(sets),
-            adjustable=most,
+            adjustable=largest_changes,
             present={key: scene.errors.amplitude(key) for key in keys},
             idle=idle,
             stiffness=tuple(stiffness.values()),

@@ -22,7 +22,7 @@ NO_EFFECT = 1e-9  # µm or µrad per unit: an effect below it is rounding
 ACROSS = 0.1  # cosine between guide and supports up to which the guide lies on them
 
 
-class Motion(NamedTuple):
+class SupportMotion(NamedTuple):
     """Small motion of a body at each of its positions."""
 
     point_mm: Array  # [m, 3] or [3]; in R
@@ -74,7 +74,7 @@ def _effect(scene: Scene, adjuster: Adjuster) -> dict[str, ErrorFunction]:
     members = [other for other in machine.adjusters if other.joint == adjuster.joint]
     index = members.index(adjuster)
     motion, centre = rigid_map(members)
-    rigid = Motion(centre, motion[:3, index], motion[3:, index])
+    rigid = SupportMotion(centre, motion[:3, index], motion[3:, index])
     if adjuster.kind is AdjusterKind.GIB:
         start = _frames(scene.model, axis, np.zeros(())).after[:3, 3]
         return _carriage_errors(
@@ -100,7 +100,7 @@ def _effect(scene: Scene, adjuster: Adjuster) -> dict[str, ErrorFunction]:
     return functions
 
 
-def _bent(members: Sequence[Adjuster], travel_um: Array, origin_mm: Array) -> Motion:
+def _bent(members: Sequence[Adjuster], travel_um: Array, origin_mm: Array) -> SupportMotion:
     """Compute the motion of a carriage on a bed or guide that supports bend by their travels."""
     placed = support_rows(members)
     if placed is None:
@@ -120,7 +120,7 @@ def _bent(members: Sequence[Adjuster], travel_um: Array, origin_mm: Array) -> Mo
     height, slope = (a + share * (b - a) for a, b in ((height, other_height), (slope, other_slope)))
     turn = np.cross(np.column_stack([slope, across]) @ axes, normal) * URAD_PER_UM_OVER_MM
     lever = (origin_mm - at.mean(axis=0)) @ normal
-    return Motion(origin_mm - lever[:, None] * normal, height[:, None] * normal, turn)
+    return SupportMotion(origin_mm - lever[:, None] * normal, height[:, None] * normal, turn)
 
 
 def _spline(at: Array, height: Array, place: Array) -> tuple[Array, Array]:
@@ -136,11 +136,11 @@ def _spline(at: Array, height: Array, place: Array) -> tuple[Array, Array]:
         matrix = np.diag(2.0 * (width[:-1] + width[1:])) + np.diag(inner, 1) + np.diag(inner, -1)
         moment[1:-1] = np.linalg.solve(matrix, 6.0 * np.diff(rise))
     inside = np.clip(place, at[0], at[-1])
-    left = np.clip(np.searchsorted(at, inside, "right") - 1, 0, len(width) - 1)
-    h, d, m, n = width[left], inside - at[left], moment[left], moment[left + 1]
-    start = rise[left] - h * (2.0 * m + n) / 6.0
+    interval = np.clip(np.searchsorted(at, inside, "right") - 1, 0, len(width) - 1)
+    h, d, m, n = width[interval], inside - at[interval], *moment[[interval, interval + 1]]
+    start = rise[interval] - h * (2.0 * m + n) / 6.0
     slope = start + d * m + d * d * (n - m) / (2.0 * h)
-    value = height[left] + d * (start + d * (m / 2.0 + d * (n - m) / (6.0 * h)))
+    value = height[interval] + d * (start + d * (m / 2.0 + d * (n - m) / (6.0 * h)))
     return value + slope * (place - inside), slope
 
 
@@ -151,7 +151,9 @@ def _frames(model: Model, axis: str, position: Array) -> AxisFrames:
     return next(frames for frames in branch_frames(model, side, at) if frames.axis.name == axis)
 
 
-def _project(scene: Scene, motion: Motion, frames: AxisFrames, rows: Sequence[Parameter]) -> Array:
+def _project(
+    scene: Scene, motion: SupportMotion, frames: AxisFrames, rows: Sequence[Parameter]
+) -> Array:
     """Split a motion of a body into errors of an axis, [..., K], µm and µrad."""
     columns: list[Array] = []
     for row in rows:
@@ -161,7 +163,7 @@ def _project(scene: Scene, motion: Motion, frames: AxisFrames, rows: Sequence[Pa
     return np.stack(np.broadcast_arrays(*columns), axis=-1)
 
 
-def _constant_errors(scene: Scene, axis: str, motion: Motion) -> dict[str, ErrorFunction]:
+def _constant_errors(scene: Scene, axis: str, motion: SupportMotion) -> dict[str, ErrorFunction]:
     """Return the constant errors of an axis whose guide moves."""
     rows = [row for row in axis_parameters(axis) if row.is_constant and row.is_rotation]
     values = _project(scene, motion, _frames(scene.model, axis, np.zeros(())), rows)
@@ -173,7 +175,7 @@ def _constant_errors(scene: Scene, axis: str, motion: Motion) -> dict[str, Error
 def _carriage_errors(
     scene: Scene,
     axis: str,
-    motion_at: Callable[[Array], Motion],
+    motion_at: Callable[[Array], SupportMotion],
     supports: Sequence[Adjuster] = (),
 ) -> dict[str, ErrorFunction]:
     """Return the component errors of an axis whose carriage moves, by its origins in R, [m, 3]."""
@@ -209,8 +211,8 @@ def _sum(present: ErrorFunction, added: ErrorFunction, span: Span, key: str) -> 
     if parameter(key).is_constant:
         return present.with_amplitude(present.amplitude + added.amplitude)
     if isinstance(present, Directional):
-        ways = (_sum(way, added, span, key) for way in (present.forward, present.backward))
-        return Directional(present.span, *ways)
+        curves = (_sum(curve, added, span, key) for curve in (present.forward, present.backward))
+        return Directional(present.span, *curves)
     if set(present.arguments) - {OWN_AXIS}:
         raise OptionError(f"{key} depends on two axes; an adjuster that changes it cannot be used")
     kinks = np.array([*present.kinks, *added.kinks])
