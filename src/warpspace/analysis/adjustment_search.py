@@ -311,6 +311,7 @@ def _joined(indices: Sequence[int]) -> tuple[int, ...]:
 
 
 MOST_CUTS = 400  # steps of the search for one number of acts
+MOST_SECONDS = 30.0  # of one of them
 
 
 @dataclass(frozen=True)
@@ -345,8 +346,8 @@ class StepSearch:
                 change, bound_um = self._relaxed(
                     size, np.concatenate(planes), np.concatenate(offsets)
                 )
-                proven = best_um - bound_um < CLOSE_UM
-                if proven:
+                proven = change is not None and best_um - bound_um < CLOSE_UM
+                if change is None or proven:
                     break
                 value_um, slopes, heights = self.evaluate(change)
                 mean, slope = self.volume.mean(self._indices, change)
@@ -385,8 +386,11 @@ class StepSearch:
             heights = -np.einsum("nc,nc->n", self.volume.error_um[worst], unit)
         return value_um, np.column_stack([slopes, -np.ones(len(slopes))]), heights
 
-    def _relaxed(self, size: int, planes: Array, offsets: Any) -> tuple[Array, float]:
-        """Return the best whole steps for the planes, [A], and the lower bound of the objective."""
+    def _relaxed(self, size: int, planes: Array, offsets: Any) -> tuple[Array | None, float]:
+        """Return the best whole steps for the planes, [A], and the lower bound of the objective.
+
+        None where the solver ran out of time.
+        """
         from scipy.optimize import LinearConstraint, milp
 
         low, high = self.steps.T
@@ -407,8 +411,9 @@ class StepSearch:
                 np.append(high, [*np.ones(len(low)), np.inf]),
             ),
             constraints=[c for c in conditions if c.A.size],
-            options={"presolve": False, "mip_rel_gap": 1e-9},
+            # with presolve, HiGHS prints messages of its own
+            options={"presolve": False, "mip_rel_gap": 1e-9, "time_limit": MOST_SECONDS},
         )
         if solution.x is None:
-            return np.zeros(len(low)), np.inf
+            return None, -np.inf
         return np.round(solution.x[: len(low)]), float(solution.mip_dual_bound)
