@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from warpspace.analysis.options import Option, options_of
-from warpspace.cli.file_arguments import DataFile, check_files, flag_of
+from warpspace.cli.file_arguments import DataFile, InputFile, check_files, flag_of
 from warpspace.cli.sampling_output import EXTRA_OPTIONS
 from warpspace.cli.shared_options import (
     SCENES,
@@ -72,6 +72,7 @@ def _click_option(option: Option) -> Callable[..., Any]:
     elif option.grammar is not None:
         traits |= {"metavar": option.grammar.metavar, "multiple": True, "required": option.required}
         traits["type"] = DataFile() if option.grammar.is_file else str
+        traits["type"] = InputFile() if option.grammar.is_extended else traits["type"]
         traits["help"] += " Repeatable." if option.grammar.many or option.grammar.each else ""
     elif option.choices:
         default = None if option.default is None else str(option.default)

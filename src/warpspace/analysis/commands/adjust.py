@@ -196,7 +196,7 @@ class Adjust(description.Analysis):
     done: File = option(
         None, "Log of the acts so far, TOML; SCENE was measured after the last of them"
     )
-    log: Annotated[str | None, Grammar("FILE", typed_word, is_output=True)] = option(
+    log: Annotated[str | None, Grammar("FILE", typed_word, is_extended=True)] = option(
         None, "Append the last acts listed, and the present errors, to this log"
     )
 

@@ -95,7 +95,7 @@ class AnalysisPanel(Section):
     def options(self) -> Sequence[Option]:
         options = [o for o in self.kind.options() if o.name not in self.unsupported]
         return [
-            o for o in options if not (o.grammar and (o.grammar.is_file or o.grammar.is_output))
+            o for o in options if not (o.grammar and (o.grammar.is_file or o.grammar.is_extended))
         ]
 
     def shown_options(self, state: AppState) -> Sequence[Option]:

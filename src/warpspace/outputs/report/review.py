@@ -271,7 +271,7 @@ def _advice(picture: ScenePicture, adjustment: Result | str, settings: ReportSet
         for key, value in adjusted.adjust.items()
     )
     if isinstance(adjusted, ActSet):
-        return f"{adjusted.label} ({changes}): {effect}."
+        return f"Adjust {adjusted.label}, which changes {changes}: {effect}."
     return f"Adjust {changes}: {effect}."
 
 
