@@ -56,8 +56,8 @@ def test_verdict_on_a_limit_that_is_exceeded():
     assert within == share_below(evaluate(scene, grid=11), 40.0)
     for number in ("30.9 µm", "41.3 µm", "'within the limit', '90.6 %'"):
         assert number in text
-    words = "Adjust front column bolts + 0.01 mm (10 µm), which changes EA0Z (squareness of Z to Y) from"
-    assert f"{words} +33.9 to +21.7 µrad: the RMS" in text
+    words = "Adjust front column bolts + 0.01 mm (10 µm), which changes EA0Z (squareness of Z to Y)"
+    assert f"{words} from +33.9 to +21.7 µrad: the RMS" in text
     assert "from 51.7 to 49.5 µm; 92 % of the volume is within the limit" in text
     assert "Why?" in text
 

@@ -174,7 +174,7 @@ def _gantries(
     return gantries
 
 
-NOT_UNIT = 1e-3  # deviation of the length of a direction from 1, beyond rounding of its numbers
+NOT_UNIT, ROUNDED = 1e-3, 1e-12  # deviations of the length of a direction from 1
 
 
 def read_adjusters(
@@ -193,11 +193,13 @@ def read_adjusters(
             if abs(length - 1.0) > NOT_UNIT:
                 problems.add(f"{key}[{index}].direction", "expected a unit vector", direction)
                 continue
-            entries["direction"] = tuple(part / length for part in direction)
+            if abs(length - 1.0) > ROUNDED:  # a written direction is read back as it is
+                entries["direction"] = tuple(part / length for part in direction)
         adjuster = adjusters.Adjuster(**entries)
         before = len(problems.lines)
         for name, text, value in _adjuster_problems(adjuster, built, machine):
-            problems.add(f"{key}[{index}].{name}", f"{adjuster.name}: {text}", value)
+            shown = ... if value is None else value
+            problems.add(f"{key}[{index}].{name}", f"{adjuster.name}: {text}", shown)
         built += [adjuster] * (len(problems.lines) == before)
     if len(built) == len(tables):
         for text in _joint_problems(built):
@@ -220,7 +222,8 @@ def _adjuster_problems(
         adjusters.AdjusterKind.OFFSET: [axis for axis in machine.axes if axis not in linear],
     }.get(kind, [adjusters.FRAME, *machine.axes])
     if body not in bodies:
-        yield "body", f"expected for a {kind} one of {', '.join(bodies) or 'no axis'}", body
+        expected = f"expected one of {', '.join(bodies)}" if bodies else "no axis can have one"
+        yield "body", f"{kind}; {expected}", body
     names = {name for other in earlier for name in (other.name, *other.groups)}
     own_groups = {name for other in earlier for name in other.groups} & {*adjuster.groups}
     twice = {adjuster.name, *adjuster.groups} & (names - own_groups)
@@ -229,11 +232,11 @@ def _adjuster_problems(
     for name in ("at_mm", "direction"):
         value = getattr(adjuster, name)
         if kind.is_parameter != (value is None):
-            expected = "is a parameter and has none" if kind.is_parameter else "is missing"
-            yield name, f"a {kind} {expected}" if kind.is_parameter else expected, value
+            expected = "a parameter of the control has none" if kind.is_parameter else "is missing"
+            yield name, f"{kind}; {expected}", value
     if bool(adjuster.pitch_mm) not in kind.pitches:
         expected = "expected the travel per turn" if kind.pitches[0] else "expected none"
-        yield "pitch_mm", f"{expected} of a {kind}", adjuster.pitch_mm
+        yield "pitch_mm", f"{kind}; {expected}", adjuster.pitch_mm
     low, high = adjuster.range
     if not low <= 0.0 <= high:
         yield "range", "expected a range around 0, the present position", list(adjuster.range)

@@ -283,6 +283,15 @@ def test_an_act_that_would_leave_a_tolerance_is_not_proposed():
 
 
 WRONG = [
+    ([f'name = "a"\nbody = "Z"\n{FOOT}'], "at_mm", "levelling foot; is missing"),
+    (
+        [
+            'name = "s"\nbody = "X"\nkind = "scale factor"\nstep = 1\nrange = [-9, 9]\n'
+            "at_mm = [0, 0, 0]"
+        ],
+        "at_mm",
+        "a parameter of the control has none",
+    ),
     ([support("a", "Q", (0, 0, 0), FOOT)], "body", "one of frame, X, Y, Z"),
     ([support("a", "Z", (0, 0, 0), FOOT.replace("[0, 0, 1]", "[0, 0, 0]"))], "direction", "unit"),
     ([support("a", "Z", (0, 0, 0), FOOT.replace("[0, 0, 1]", "[0, 0, 2]"))], "direction", "unit"),
@@ -308,7 +317,7 @@ WRONG = [
      + ['name = "t"\nbody = "X"\nkind = "scale factor"\nstep = 1\nrange = [-9, 9]'],
      "adjusters", "dependent; expected one scale factor of X"),
     (['name = "s"\nbody = "X"\nkind = "encoder offset"\nstep = 1\nrange = [-9, 9]'], "body",
-     "no axis"),
+     "no axis can have one"),
     (
         [
             support(str(n), "Z", at, (FOOT if n else SHIM) + '\ngroups = ["g"]')
@@ -332,6 +341,10 @@ def test_invalid_adjusters_are_refused_with_one_message(entries, key, expected):
 
 def test_adjusters_survive_writing_and_reading():
     scene = scene_of(*(support(f"foot {n}", "Z", at, FOOT) for n, at in enumerate(THREE)))
+    assert parse_scene(scene_to_toml(scene), "tried") == scene
+    third = FOOT.replace("[0, 0, 1]", "[0.5774, 0.5774, 0.5774]")
+    scene = scene_of(*(support(f"foot {n}", "Z", at, third) for n, at in enumerate(THREE)))
+    assert np.linalg.norm(scene.machine.adjusters[0].direction) == pytest.approx(1.0, abs=1e-12)
     assert parse_scene(scene_to_toml(scene), "tried") == scene
 
 
