@@ -9,6 +9,7 @@ import numpy as np
 
 from warpspace.analysis.act_planning import Act
 from warpspace.analysis.adjuster_effects import adjuster_effects
+from warpspace.analysis.uncertainty.propagation import coverage_factor
 from warpspace.exceptions import SceneError
 from warpspace.machine.adjusters import Adjuster
 from warpspace.machine.axes import PARAMETERS, parameter
@@ -123,7 +124,7 @@ def learn_stiffness(
     precision = np.eye(len(names)) / PRIOR_SD**2 + design.T @ design
     covariance = np.linalg.inv(precision)
     factors = 1.0 + covariance @ design.T @ (reading - design.sum(axis=1))
-    u95 = 1.96 * np.sqrt(np.diagonal(covariance))
+    u95 = coverage_factor(np.inf) * np.sqrt(np.diagonal(covariance))
     values = zip(names, factors.tolist(), u95.tolist(), strict=True)
     return {name: Stiffness(name, factor, width) for name, factor, width in values}
 

@@ -285,10 +285,7 @@ def test_an_act_that_would_leave_a_tolerance_is_not_proposed():
 WRONG = [
     ([f'name = "a"\nbody = "Z"\n{FOOT}'], "at_mm", "levelling foot; is missing"),
     (
-        [
-            'name = "s"\nbody = "X"\nkind = "scale factor"\nstep = 1\nrange = [-9, 9]\n'
-            "at_mm = [0, 0, 0]"
-        ],
+        ['name = "s"\nbody = "X"\nkind = "scale factor"\nstep = 1\nat_mm = [0, 0, 0]\nrange = [0, 9]'],
         "at_mm",
         "a parameter of the control has none",
     ),
@@ -372,7 +369,7 @@ def test_stiffness_is_the_bayes_estimate_of_the_change(tmp_path):
     (learnt,) = result.stiffness
     assert learnt.adjuster == "foot 0"
     assert learnt.factor == pytest.approx((1.0 / 0.09 + weights @ [1.2, 1.1]) / precision)
-    assert learnt.u95 == pytest.approx(1.96 / precision**0.5)
+    assert learnt.u95 == pytest.approx(2.0 / precision**0.5)
     assert result.as_json()["stiffness"] == [
         {"adjuster": "foot 0", "factor": learnt.factor, "u95": learnt.u95}
     ]
@@ -420,3 +417,28 @@ def test_check_lists_adjusters_outside_the_meshes_they_lie_between():
     )
     assert "y" in problem
     assert "-620…1250" in problem
+
+
+def test_the_result_of_acts_is_stated_with_its_uncertainty():
+    scene = load_scene("dvf5000_first")
+    stated = replace(scene, uncertainty={key: Constant((0.0, 1.0), 1.0) for key in scene.errors})
+    result = Adjust(grid=3, count=1, objective="max").run(stated)
+    (best,) = result.adjustments
+    u95 = best.expanded_uncertainty["u95_max_um"]
+    # the largest error is that of one node, and its uncertainty that of the errors times the gains
+    after = best.applied_to(stated)
+    grid = build_grid(after.model, after.workspace, 3)
+    error = evaluate_grid(after, grid, after.view()).error_um.reshape(-1, 3)
+    worst = int(np.argmax(np.linalg.norm(error, axis=1)))
+    along = error[worst] / np.linalg.norm(error[worst])
+    raised = [
+        replace(after, errors=ErrorSet({key: Constant((0.0, 1.0), 1.0)})) for key in scene.errors
+    ]
+    gains = [
+        evaluate_grid(one, grid, one.view()).error_um.reshape(-1, 3)[worst] @ along
+        for one in raised
+    ]
+    # curves vary along their axis: two modes; at the end of an axis only one of them acts
+    assert u95 == pytest.approx(2.0 * np.linalg.norm(gains), rel=1e-6)
+    text = " ".join(block for block in result.blocks() if isinstance(block, str))
+    assert f"set 1: largest |E| 51.7 → {best.max_um:.1f} ± {u95:.1f} µm; EA0Z 33.9 →" in text

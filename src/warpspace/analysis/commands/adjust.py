@@ -124,7 +124,8 @@ class ActSet(AdjustedSet):
         "acts", "adjust", *FOUR, "exact", "expanded_uncertainty",
     )  # fmt: skip
     acts: tuple[Act, ...]
-    errors: ErrorSet
+    errors: ErrorSet  # of the machine after them
+    error_um: Array = attribute(compare=False)  # [..., 3]; of the nodes, to first order
 
     @property
     def size(self) -> int:
@@ -251,9 +252,7 @@ class Adjust(description.Analysis):
             result = self._with_acts(result, grid, error, watch)
         at = grid.coordinates, view, grid.point_mm, grid.weights
         uncertainty = propagation.field_uncertainty(scene, error, *at)
-        return (
-            result if uncertainty is None else _with_uncertainty(result, uncertainty, basis, grid)
-        )
+        return result if uncertainty is None else _with_uncertainty(result, uncertainty, basis)
 
     def included(self, scene: Scene) -> Sequence[str]:
         return scene.parameter_keys
@@ -305,6 +304,7 @@ class Adjust(description.Analysis):
                     acts=plan.acts,
                     adjust=adjust,
                     errors=plan.errors,
+                    error_um=plan.error_um,
                     proven=plan.proven,
                     exact=Summary(*exact.four),
                 )
@@ -599,14 +599,13 @@ def apply_adjustments(scene: Scene, adjust: Mapping[str, float]) -> Scene:
 
 
 def _with_uncertainty(
-    result: AdjustResult, before: propagation.FieldUncertainty, basis: ErrorBasis, grid: Grid
+    result: AdjustResult, before: propagation.FieldUncertainty, basis: ErrorBasis
 ) -> AdjustResult:
     def u95_after(
-        adjust: Mapping[str, float], act_set: AdjustedSet | None = None
+        adjust: Mapping[str, float], adjusted: AdjustedSet | None = None
     ) -> description.ExpandedUncertainty[float | None]:
-        if isinstance(act_set, ActSet):
-            adjusted = act_set.applied_to(result.scene)
-            error_um = evaluate_grid(adjusted, grid, result.view).error_um
+        if isinstance(adjusted, ActSet):
+            error_um = adjusted.error_um
         else:
             values = amplitudes_of(apply_adjustments(result.scene, adjust).errors, basis.keys)
             error_um = basis.evaluate(values, orientation=False).error_um
