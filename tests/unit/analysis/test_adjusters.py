@@ -282,10 +282,11 @@ def test_an_act_that_would_leave_a_tolerance_is_not_proposed():
     assert not bound.adjustments
 
 
+SCALE = 'name = "s"\nbody = "X"\nkind = "scale factor"\nstep = 1\nrange = [-9, 9]'
 WRONG = [
     ([f'name = "a"\nbody = "Z"\n{FOOT}'], "at_mm", "levelling foot; is missing"),
     (
-        ['name = "s"\nbody = "X"\nkind = "scale factor"\nstep = 1\nat_mm = [0, 0, 0]\nrange = [0, 9]'],
+        [f"{SCALE}\nat_mm = [0, 0, 0]"],
         "at_mm",
         "a parameter of the control has none",
     ),
