@@ -196,8 +196,8 @@ def write_result(
 
         draw = resolve_name(result.drawn_by) if result.drawn_by else result_chart
         files[plot] = encode_figure(draw(result), Path(plot).suffix.lower().lstrip("."))
-    write_texts(files, force=force)
     logs: dict[str | Path, str | bytes] = {**result.updated_files()}
+    write_texts(files, force=force)
     write_texts(logs, force=True)
     return written_files
 
