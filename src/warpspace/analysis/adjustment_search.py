@@ -246,21 +246,15 @@ def least_max(
     offsets: list[Array] = []
     best, best_um = change, np.inf
     for _ in range(MOST_STEPS):
-        error = volume.error_um + np.tensordot(change, chosen, 1)
-        norm = np.sqrt(np.einsum("nc,nc->n", error, error))
-        largest = float(norm.max())
+        largest, slopes, heights = _tangent_planes(volume, chosen, change)
         mean, slope = volume.mean(indices, change) if mean_um < np.inf else (0.0, goal[:-1])
         if mean > mean_um:
             planes.append(np.append(slope, 0.0)[None])
             offsets.append(np.array([mean_um - mean + slope @ change]))
         if mean <= mean_um + CLOSE_UM and largest < best_um:
             best, best_um = change, largest
-        count = min(NODES_AT_ONCE, norm.size)
-        worst = np.argpartition(norm, -count)[-count:]
-        unit = error[worst] / np.maximum(norm[worst], np.finfo(float).tiny)[:, None]
-        slopes = np.einsum("knc,nc->nk", chosen[:, worst], unit)
-        planes.append(np.column_stack([slopes, -np.ones(len(worst))]))
-        offsets.append(-np.einsum("nc,nc->n", volume.error_um[worst], unit))
+        planes.append(slopes)
+        offsets.append(heights)
         solution = linprog(goal, np.concatenate(planes), np.concatenate(offsets), bounds=ranges)
         if solution.status != 0:
             break
@@ -270,6 +264,20 @@ def least_max(
             break
         change = np.clip(solution.x[:size], *bounds[list(indices)].T)
     return Solution(indices, best, best_um) if best_um < np.inf else None
+
+
+def _tangent_planes(volume: Volume, chosen: Array, change: Array) -> tuple[float, Array, Array]:
+    """Return the largest error after a change, and planes below it at its worst nodes.
+
+    Slopes, [P, k + 1], by the change and by the largest error, and offsets, [P].
+    """
+    error = volume.error_um + np.tensordot(change, chosen, 1)
+    norm = np.sqrt(np.einsum("nc,nc->n", error, error))
+    count = min(NODES_AT_ONCE, norm.size)
+    worst = np.argpartition(norm, -count)[-count:]
+    unit = error[worst] / np.maximum(norm[worst], np.finfo(float).tiny)[:, None]
+    slopes = np.column_stack([np.einsum("knc,nc->nk", chosen[:, worst], unit), -np.ones(count)])
+    return float(norm.max()), slopes, -np.einsum("nc,nc->n", volume.error_um[worst], unit)
 
 
 def _least_max_of_one(
@@ -368,23 +376,14 @@ class StepSearch:
 
     def evaluate(self, change: Array) -> tuple[float, Array, Array]:
         """Return the objective, and planes below it: slopes, [P, A + 1], and offsets, [P]."""
-        if self.objective is Objective.RMS:
-            matrix, error = self.volume.triangle
-            chosen = matrix[:, 1:]
-            remaining = chosen @ change + error
-            value_um = float(np.linalg.norm(remaining))
-            unit = remaining[None] / max(value_um, np.finfo(float).tiny)
-            slopes, heights = unit @ chosen, -unit @ error
-        else:
-            chosen = self.volume.response[1:]
-            error = self.volume.error_um + np.tensordot(change, chosen, 1)
-            norm = np.sqrt(np.einsum("nc,nc->n", error, error))
-            value_um, count = float(norm.max()), min(NODES_AT_ONCE, norm.size)
-            worst = np.argpartition(norm, -count)[-count:]
-            unit = error[worst] / np.maximum(norm[worst], np.finfo(float).tiny)[:, None]
-            slopes = np.einsum("knc,nc->nk", chosen[:, worst], unit)
-            heights = -np.einsum("nc,nc->n", self.volume.error_um[worst], unit)
-        return value_um, np.column_stack([slopes, -np.ones(len(slopes))]), heights
+        if self.objective is Objective.MAX:
+            return _tangent_planes(self.volume, self.volume.response[1:], change)
+        matrix, error = self.volume.triangle
+        chosen = matrix[:, 1:]
+        remaining = chosen @ change + error
+        value_um = float(np.linalg.norm(remaining))
+        unit = remaining[None] / max(value_um, np.finfo(float).tiny)
+        return value_um, np.append(unit @ chosen, [[-1.0]], axis=1), -unit @ error
 
     def _relaxed(self, size: int, planes: Array, offsets: Any) -> tuple[Array | None, float]:
         """Return the best whole steps for the planes, [A], and the lower bound of the objective.
