@@ -182,7 +182,7 @@ def test_an_adjustment_is_decided_on_and_taken_back(tab):
     tab.says("51.7 → 49.5 µm")
     tab.click("Apply")
     tab.click("Record decision")
-    tab.until(lambda: "EA0Z" in tab.page.locator("#ws-notes textarea").input_value())
+    tab.until(lambda: "front column bolts" in tab.page.locator("#ws-notes textarea").input_value())
     tab.click("Save note")
     tab.says("max 51.72 → 49.5", within="#ws-notes .ws-note")
     (note,) = tab.state.review
