@@ -1,5 +1,6 @@
 """Search for the best values of errors over the volume, for one set and for the best sets."""
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -319,7 +320,7 @@ def _joined(indices: Sequence[int]) -> tuple[int, ...]:
 
 
 MOST_CUTS = 400  # steps of the search for one number of acts
-MOST_SECONDS = 30.0  # of one of them
+MOST_SECONDS = 60.0  # for one number of acts
 
 
 @dataclass(frozen=True)
@@ -348,12 +349,11 @@ class StepSearch:
         planes, offsets = [np.zeros((0, 2 * len(self.steps) + 1))], [np.zeros(0)]
         best, best_um = np.zeros(len(self.steps)), self.evaluate(np.zeros(len(self.steps)))[0]
         for size in range(1, min(count, len(self.steps)) + 1):
-            before_um, proven = best_um, False
+            before_um, proven, end_s = best_um, False, time.monotonic() + MOST_SECONDS
             for number in range(MOST_CUTS):
                 advance((size - 1 + number / MOST_CUTS) / count)
-                change, bound_um = self._relaxed(
-                    size, np.concatenate(planes), np.concatenate(offsets)
-                )
+                below = np.concatenate(planes), np.concatenate(offsets)
+                change, bound_um = self._relaxed(size, *below, end_s - time.monotonic())
                 proven = change is not None and best_um - bound_um < CLOSE_UM
                 if change is None or proven:
                     break
@@ -385,13 +385,17 @@ class StepSearch:
         unit = remaining[None] / max(value_um, np.finfo(float).tiny)
         return value_um, np.append(unit @ chosen, [[-1.0]], axis=1), -unit @ error
 
-    def _relaxed(self, size: int, planes: Array, offsets: Any) -> tuple[Array | None, float]:
+    def _relaxed(
+        self, size: int, planes: Array, offsets: Any, seconds: float
+    ) -> tuple[Array | None, float]:
         """Return the best whole steps for the planes, [A], and the lower bound of the objective.
 
         None where the solver ran out of time.
         """
         from scipy.optimize import LinearConstraint, milp
 
+        if seconds <= 0.0:
+            return None, -np.inf
         low, high = self.steps.T
         acts, still = np.eye(len(low)), np.zeros((len(low), 1))
         goal = np.append(np.zeros(2 * len(low)), 1.0)
@@ -411,7 +415,7 @@ class StepSearch:
             ),
             constraints=[c for c in conditions if c.A.size],
             # with presolve, HiGHS prints messages of its own
-            options={"presolve": False, "mip_rel_gap": 1e-9, "time_limit": MOST_SECONDS},
+            options={"presolve": False, "mip_rel_gap": 1e-9, "time_limit": seconds},
         )
         if solution.x is None:
             return None, -np.inf

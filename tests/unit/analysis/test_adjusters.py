@@ -8,6 +8,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from warpspace import evaluate
+from warpspace.analysis import adjustment_search
 from warpspace.analysis.adjuster_effects import add_effects, adjuster_effects
 from warpspace.analysis.adjustment_search import Objective, StepSearch, Volume
 from warpspace.analysis.commands.adjust import Adjust
@@ -443,3 +444,29 @@ def test_the_result_of_acts_is_stated_with_its_uncertainty():
     assert u95 == pytest.approx(2.0 * np.linalg.norm(gains), rel=1e-6)
     text = " ".join(block for block in result.blocks() if isinstance(block, str))
     assert f"set 1: largest |E| 51.7 → {best.max_um:.1f} ± {u95:.1f} µm; EA0Z 33.9 →" in text
+
+
+def test_supports_that_move_tool_and_workpiece_together_are_listed_as_idle():
+    corners = [(x, y, -100.0) for y in (-250.0, 250.0) for x in (-500.0, 500.0)][:3]
+    feet = [support(f"foot {n}", "frame", at, FOOT) for n, at in enumerate(corners)]
+    # the first axis carries all others over a fixed table: a placement of the workpiece
+    feet += [support(f"shim {n}", "X", at, SHIM) for n, at in enumerate(corners)]
+    result = Adjust(grid=3).run(scene_of(*feet, errors="[errors]\nEA0Z = 50\n"))
+    assert not result.adjustments
+    text = " ".join(block for block in result.blocks() if isinstance(block, str))
+    assert "no effect in this loop: foot 0, foot 1, foot 2, shim 0, shim 1, shim 2" in text
+    assert result.no_change in text or "No act on an adjuster" in text
+
+
+def test_a_search_that_is_cut_short_claims_no_proof(monkeypatch):
+    volume = random_volume(np.random.default_rng(0), 4)
+    free = np.zeros((0, 4)), np.zeros((0, 2))
+    search = StepSearch(volume, Objective.RMS, np.array([[-3.0, 3.0]] * 4), *free)
+    ((best, proven),) = search.best_sets(2, lambda _: None)  # a second act gains nothing
+    assert proven
+    monkeypatch.setattr(adjustment_search, "MOST_CUTS", 10)
+    ((same, proven),) = search.best_sets(1, lambda _: None)
+    assert np.array_equal(same, best)
+    assert not proven
+    monkeypatch.setattr(adjustment_search, "MOST_SECONDS", 0.0)
+    assert [*search.best_sets(1, lambda _: None)] == []

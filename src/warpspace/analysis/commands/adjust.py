@@ -489,9 +489,14 @@ class AdjustResult(description.Result):
                 f" {OBJECTIVE_WORDS[self.objective]} over smaller sets)"
             )
         sizes = [str(adjusted.size) for adjusted in self.adjustments if not adjusted.proven]
+        unproven = (
+            f"  sets of {', '.join(sizes)}: not proven to be the best in the time of the search"
+        )
         yield (
             "  all sets compared"
             if not sizes
+            else unproven
+            if self.is_acts
             else f"  sets of {', '.join(sizes)}: too many to compare all; built up one by one, with"
             " members swapped as long as that helped"
         )
