@@ -131,7 +131,7 @@ def point_labels(picture: LivePicture) -> list[Label]:
         same_text = other.text.startswith(label.text.removeprefix("max "))
         if same_text and distance < TICK * picture.size_mm:
             worst = []
-    acts = [Label(text, at) for text, at, _ in planned_adjusters(picture.state)]
+    acts = [Label(text, at) for text, at, _ in planned_adjusters(picture.state) if text]
     return [*worst, *point, *acts, *_measured(picture), *_names(picture), *_corners(picture)]
 
 

@@ -171,14 +171,21 @@ def plan_test(test: BenchTest, scene: Scene) -> BenchPlan:
 
 
 def planned_adjusters(state: AppState) -> list[tuple[str, Array, Array]]:
-    """List the acts drawn while *Adjustment* is open: text, place, [3], mm, and direction, [3]."""
+    """List the adjusters drawn while *Adjustment* is open: text, place, [3], mm, direction, [3].
+
+    The text is the act; it is empty for further members of a group.
+    """
     page = state.page
     if page.task != Adjust.task or Adjust.name not in page.open:
         return []
     return [
-        (str(act), np.array(member.at_mm), np.sign(act.change) * np.array(member.direction))
+        (
+            "" if index else str(act),
+            np.array(member.at_mm),
+            np.sign(act.change) * np.array(member.direction),
+        )
         for act in page.acts
-        for member in act.members
+        for index, member in enumerate(act.members)
         if member in state.scene.machine.adjusters and not member.kind.is_parameter
     ]
 
