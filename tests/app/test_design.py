@@ -15,6 +15,9 @@ from warpspace.analysis.commands.concepts import Concepts, compare_concepts
 from warpspace.analysis.registry import entries
 from warpspace.app.browser import actions as do
 from warpspace.app.documents.output_services import Services
+from warpspace.app.drawing.around import STROKES, draw_surroundings
+from warpspace.app.drawing.labels import point_labels
+from warpspace.app.evaluation.scene_overlays import planned_adjusters
 from warpspace.app.panels import design
 from warpspace.app.panels.improve import AdjustPanel
 from warpspace.app.state import edits
@@ -53,7 +56,9 @@ def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
     assert part.offered_changes(found) == [0, 1]  # of sets of one, two and three
     shown = section(part, state)
     assert shown.count("&quot;Apply&quot;") == 2
-    assert re.search(r"<b>EC0Y 23\.1 → [\d.]+ µrad</b>.*max</th><td>51\.7 → ", shown)
+    assert re.search(
+        r"<b>front column bolts \+ 0\.015 mm \(15 µm\)</b>.*max</th><td>51\.7 → ", shown
+    )
     applied = part.handle(state, do.Apply("adjust", 1))
     assert applied.comparison.a.title == "before adjustment"
     assert "&quot;Apply&quot;" not in section(part, applied)
@@ -62,6 +67,35 @@ def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
     assert "reduces the error by 1 % or more" in section(part, applied)
     assert part.handle(applied, do.Apply("adjust", 9)) is applied
     assert part.handle(state, do.Apply("best", 1)) is state
+
+
+def test_the_selected_acts_are_drawn_at_their_adjusters_while_the_section_is_open():
+    part = lone_part(AdjustPanel, "adjust")
+    state = replace(START, forms={"adjust.objective": "max", "adjust.grid": "5"})
+    state = replace(state, page=replace(state.page, task="improve"))
+    ran(part, state)
+    best = part.outcome.result.adjustments[part.offered_changes(part.outcome.result)[-1]]
+    for update in part.context.posted:
+        state = update(state)
+    assert state.page.acts == best.acts
+    members = [member for act in best.acts for member in act.members]
+    placed = planned_adjusters(state)
+    assert [(text, tuple(at)) for text, at, _ in placed] == [
+        (str(act) if member is act.members[0] else "", member.at_mm)
+        for act in best.acts
+        for member in act.members
+    ]
+    assert all(
+        tuple(way) == member.direction for (*_, way), member in zip(placed, members, strict=True)
+    )
+    picture = LIVE.evaluate(state)
+    assert {str(act) for act in best.acts} <= {label.text for label in point_labels(picture)}
+    shapes = draw_surroundings(picture)
+    assert len(shapes["/adjusters/arrows"].assigned["points"]) == len(members) * (1 + STROKES)
+    previewed = part.handle(state, do.Preview("adjust", 0))
+    assert previewed.page.acts == part.outcome.result.adjustments[0].acts
+    for elsewhere in ({"task": "design"}, {"open": frozenset()}):
+        assert not planned_adjusters(replace(state, page=replace(state.page, **elsewhere)))
 
 
 # --- Tolerances -----------------------------------------------------------------------------------

@@ -203,15 +203,16 @@ def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_hold
     part = lone_part(BestPanel)
     assert "Searching" in html_of(part)
     html = settled(part)
-    assert "EA0Z 33.9 → 20.2 µrad" in html
-    assert "30.9 → 24.6 µm" in html
+    assert "front column bolts + 0.01 mm (10 µm)" in html
+    assert "EA0Z 33.9 → 21.7 µrad" in html
+    assert "30.9 → 24.9 µm" in html
     applied = part.handle(START, do.Apply("best", 0))
-    assert LIVE.evaluate(applied).statistics.max_um == pytest.approx(50.23, abs=0.01)
+    assert LIVE.evaluate(applied).statistics.max_um == pytest.approx(49.50, abs=0.01)
     assert applied.comparison.b is not None
     previewed = part.handle(START, do.Preview("best", 0))
-    assert previewed.comparison.b.title == "after adjustment: EA0Z → 20.2"
+    assert previewed.comparison.b.title == "after adjustment: front column bolts + 0.01 mm (10 µm)"
     assert previewed.amplitudes == START.amplitudes
-    assert LIVE.evaluate(previewed).statistics.max_um == pytest.approx(50.23, abs=0.01)
+    assert LIVE.evaluate(previewed).statistics.max_um == pytest.approx(49.50, abs=0.01)
     moved = START.with_amplitude("EAX", 9.0)
     assert "disabled" in html_of(part, moved)
     wait(part)

@@ -12,6 +12,7 @@ import pytest
 from products import first, pairwise
 from warpspace import __version__
 from warpspace.outputs.figures import registry
+from warpspace.resources import scenes_dir
 from warpspace.scene.library import load_scene
 
 SCENE = """
@@ -263,3 +264,26 @@ def test_a_scene_is_refused_with_the_covariance_of_another_calibration(tmp_path,
     assert write(2.0, 2) == 0
     assert warpspace("check", tmp_path / "x.toml").status == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["x.npz", "x.toml"]
+
+
+def test_a_log_of_adjustments_is_extended_and_never_damaged(tmp_path, warpspace):
+    text = (scenes_dir() / "dvf5000_first.toml").read_text("utf-8")
+    scene, log = tmp_path / "m.toml", tmp_path / "log.toml"
+    scene.write_text(f"{text}\n[uncertainty]\nEA0Z = 1\nEB0Z = 1\nEB0B = 1\n", encoding="utf-8")
+    call = ("adjust", scene, "--grid", "3", "--count", "1", "--log", log)
+    first = warpspace(*call, "-o", tmp_path / "after.toml", "--json").json
+    (act,) = first["adjustments"][0]["acts"]
+    assert log.read_text("utf-8") == (
+        f'[[done]]\nacts = {{ "{act["adjuster"]}" = {act["change"]} }}\n'
+        "before = { EA0Z = 33.9 }\n"
+    )
+    again = ("adjust", tmp_path / "after.toml", "--grid", "3", "--done", log, "--json")
+    learned = warpspace(*again).json["stiffness"]
+    assert [one["factor"] for one in learned] == pytest.approx([1.0, 1.0])
+    before = log.read_bytes()
+    warpspace(*call, "-o", log).refused("log.toml")
+    log.write_bytes(before + b"[[done]]\nacts = 3\n")
+    warpspace(*again).refused("done[1].acts = 3", "expected a table")
+    warpspace(*call).refused("done[1].acts = 3")
+    assert log.read_bytes() == before + b"[[done]]\nacts = 3\n"
+    warpspace("adjust", "machine_scara", "--log", log).refused("--log", "has no adjusters")

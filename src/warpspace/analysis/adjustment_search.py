@@ -1,12 +1,13 @@
 """Search for the best values of errors over the volume, for one set and for the best sets."""
 
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 from itertools import combinations
 from math import comb
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -246,21 +247,15 @@ def least_max(
     offsets: list[Array] = []
     best, best_um = change, np.inf
     for _ in range(MOST_STEPS):
-        error = volume.error_um + np.tensordot(change, chosen, 1)
-        norm = np.sqrt(np.einsum("nc,nc->n", error, error))
-        largest = float(norm.max())
+        largest, slopes, heights = _tangent_planes(volume, chosen, change)
         mean, slope = volume.mean(indices, change) if mean_um < np.inf else (0.0, goal[:-1])
         if mean > mean_um:
             planes.append(np.append(slope, 0.0)[None])
             offsets.append(np.array([mean_um - mean + slope @ change]))
         if mean <= mean_um + CLOSE_UM and largest < best_um:
             best, best_um = change, largest
-        count = min(NODES_AT_ONCE, norm.size)
-        worst = np.argpartition(norm, -count)[-count:]
-        unit = error[worst] / np.maximum(norm[worst], np.finfo(float).tiny)[:, None]
-        slopes = np.einsum("knc,nc->nk", chosen[:, worst], unit)
-        planes.append(np.column_stack([slopes, -np.ones(len(worst))]))
-        offsets.append(-np.einsum("nc,nc->n", volume.error_um[worst], unit))
+        planes.append(slopes)
+        offsets.append(heights)
         solution = linprog(goal, np.concatenate(planes), np.concatenate(offsets), bounds=ranges)
         if solution.status != 0:
             break
@@ -270,6 +265,20 @@ def least_max(
             break
         change = np.clip(solution.x[:size], *bounds[list(indices)].T)
     return Solution(indices, best, best_um) if best_um < np.inf else None
+
+
+def _tangent_planes(volume: Volume, chosen: Array, change: Array) -> tuple[float, Array, Array]:
+    """Return the largest error after a change, and planes below it at its worst nodes.
+
+    Slopes, [P, k + 1], by the change and by the largest error, and offsets, [P].
+    """
+    error = volume.error_um + np.tensordot(change, chosen, 1)
+    norm = np.sqrt(np.einsum("nc,nc->n", error, error))
+    count = min(NODES_AT_ONCE, norm.size)
+    worst = np.argpartition(norm, -count)[-count:]
+    unit = error[worst] / np.maximum(norm[worst], np.finfo(float).tiny)[:, None]
+    slopes = np.column_stack([np.einsum("knc,nc->nk", chosen[:, worst], unit), -np.ones(count)])
+    return float(norm.max()), slopes, -np.einsum("nc,nc->n", volume.error_um[worst], unit)
 
 
 def _least_max_of_one(
@@ -308,3 +317,106 @@ def _least_max_of_one(
 
 def _joined(indices: Sequence[int]) -> tuple[int, ...]:
     return tuple(sorted(indices))
+
+
+MOST_CUTS = 400  # steps of the search for one number of acts
+MOST_SECONDS = 60.0  # for one number of acts
+
+
+@dataclass(frozen=True)
+class StepSearch:
+    """Search for the best whole steps of a few acts.
+
+    Notes
+    -----
+    Both objectives and the mean are convex, so that a tangent plane at any change is below them. A
+    mixed-integer program with the planes so far gives a lower bound and the next change, where new
+    planes are added. It ends when the best change met is within `CLOSE_UM` of the lower bound,
+    which is proof for all changes at once.
+    """
+
+    volume: Volume  # of the present error, with amplitude 1, and of one step of each act
+    objective: Objective
+    steps: Array  # [A, 2]; least and largest number of steps of each act
+    rows: Array  # [R, A]; of linear conditions on the steps
+    limits: Array  # [R, 2]; least and largest value of each condition
+    mean_um: float = np.inf  # largest mean |E| after the change
+
+    def best_sets(
+        self, count: int, advance: Callable[[float], None]
+    ) -> Iterator[tuple[Array, bool]]:
+        """Find the best steps, [A], of at most one, two, … acts, and whether that is proven."""
+        planes, offsets = [np.zeros((0, 2 * len(self.steps) + 1))], [np.zeros(0)]
+        best, best_um = np.zeros(len(self.steps)), self.evaluate(np.zeros(len(self.steps)))[0]
+        for size in range(1, min(count, len(self.steps)) + 1):
+            before_um, proven, end_s = best_um, False, time.monotonic() + MOST_SECONDS
+            for number in range(MOST_CUTS):
+                advance((size - 1 + number / MOST_CUTS) / count)
+                below = np.concatenate(planes), np.concatenate(offsets)
+                change, bound_um = self._relaxed(size, *below, end_s - time.monotonic())
+                proven = change is not None and best_um - bound_um < CLOSE_UM
+                if change is None or proven:
+                    break
+                value_um, slopes, heights = self.evaluate(change)
+                mean, slope = self.volume.mean(self._indices, change)
+                if mean > self.mean_um + CLOSE_UM:
+                    slopes = np.concatenate([slopes, np.append(slope, 0.0)[None]])
+                    heights = np.append(heights, self.mean_um - mean + slope @ change)
+                elif value_um < best_um:
+                    best, best_um = change, value_um
+                planes.append(np.insert(slopes, [len(change)] * len(change), 0.0, axis=1))
+                offsets.append(heights)
+            if best_um > before_um - CLOSE_UM:
+                return
+            yield best, proven
+
+    @property
+    def _indices(self) -> tuple[int, ...]:
+        return tuple(range(1, len(self.steps) + 1))
+
+    def evaluate(self, change: Array) -> tuple[float, Array, Array]:
+        """Return the objective, and planes below it: slopes, [P, A + 1], and offsets, [P]."""
+        if self.objective is Objective.MAX:
+            return _tangent_planes(self.volume, self.volume.response[1:], change)
+        matrix, error = self.volume.triangle
+        chosen = matrix[:, 1:]
+        remaining = chosen @ change + error
+        value_um = float(np.linalg.norm(remaining))
+        unit = remaining[None] / max(value_um, np.finfo(float).tiny)
+        return value_um, np.append(unit @ chosen, [[-1.0]], axis=1), -unit @ error
+
+    def _relaxed(
+        self, size: int, planes: Array, offsets: Any, seconds: float
+    ) -> tuple[Array | None, float]:
+        """Return the best whole steps for the planes, [A], and the lower bound of the objective.
+
+        None where the solver ran out of time.
+        """
+        from scipy.optimize import LinearConstraint, milp
+
+        if seconds <= 0.0:
+            return None, -np.inf
+        low, high = self.steps.T
+        acts, still = np.eye(len(low)), np.zeros((len(low), 1))
+        goal = np.append(np.zeros(2 * len(low)), 1.0)
+        conditions = [
+            LinearConstraint(np.hstack([acts, -np.diag(high), still]), -np.inf, 0.0),
+            LinearConstraint(np.hstack([acts, -np.diag(low), still]), 0.0, np.inf),
+            LinearConstraint(np.hstack([0.0 * low, np.ones(len(low)), [0.0]]), 0.0, size),
+            LinearConstraint(np.pad(self.rows, ((0, 0), (0, len(low) + 1))), *self.limits.T),
+            LinearConstraint(planes, -np.inf, offsets),
+        ]
+        solution = milp(
+            goal,
+            integrality=1.0 - goal,
+            bounds=(
+                np.append(low, np.zeros(len(low) + 1)),
+                np.append(high, [*np.ones(len(low)), np.inf]),
+            ),
+            constraints=[c for c in conditions if c.A.size],
+            # with presolve, HiGHS prints messages of its own
+            options={"presolve": False, "mip_rel_gap": 1e-9, "time_limit": seconds},
+        )
+        if solution.x is None:
+            return None, -np.inf
+        return np.round(solution.x[: len(low)]), float(solution.mip_dual_bound)

@@ -54,6 +54,7 @@ class Change:
 
     label: str
     scene: "Scene"
+    steps: tuple[str, ...] = ()  # to carry out, where they are more than changes of errors
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,6 +87,10 @@ class Result(ABC):
 
     def output_files(self, _ending: str = "", /) -> Mapping[str, str | bytes]:
         """Return the files that -o writes, by the suffix added to its name: "", "_X.COM"."""
+        return {}
+
+    def updated_files(self) -> Mapping[str, str]:
+        """Return the text of files that the analysis extends, such as logs, by path."""
         return {}
 
     def as_json(self) -> dict[str, Any]:

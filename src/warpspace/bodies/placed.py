@@ -9,7 +9,7 @@ import numpy as np
 
 from warpspace.bodies.frame import generate_bodies
 from warpspace.bodies.mesh import Body
-from warpspace.bodies.mesh_files import machine_meshes
+from warpspace.bodies.mesh_files import check_meshes, machine_meshes
 from warpspace.bodies.schematic import BODY_FILE, build_layout, read_bodies
 from warpspace.bodies.shading import ShadedSurface, shade_bodies
 from warpspace.field.evaluate import View, find_placement, placement_effect
@@ -22,6 +22,8 @@ from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 
+OUTSIDE_MM = 1.0  # distance of an adjuster from the box around its body that is accepted
+
 
 def load_bodies(machine: Machine) -> tuple[Body, ...]:
     frames = {BASE, "S", "t", "w", *machine.axes}
@@ -29,6 +31,43 @@ def load_bodies(machine: Machine) -> tuple[Body, ...]:
     meshes = machine_meshes(machine)
     bodies = [body for body in schematic or generate_bodies(machine) if body.frame not in meshes]
     return tuple(body for body in (*bodies, *meshes.values()) if body.frame in frames)
+
+
+def check_bodies(model: Model) -> tuple[str, ...]:
+    """List problems of the meshes of a machine, and of the adjusters between them."""
+    return (*check_meshes(model.machine), *check_adjusters(model))
+
+
+def check_adjusters(model: Model) -> tuple[str, ...]:
+    """List adjusters outside the box around the meshes that they lie between; axes at 0."""
+    machine = model.machine
+    motions = body_motions(
+        model, {}, complete_coordinates(machine, dict.fromkeys(machine.axes, 0.0))
+    )
+    has_file = machine.body_dir and (Path(machine.body_dir) / BODY_FILE).is_file()
+    bodies = load_bodies(machine) if has_file else machine_meshes(machine).values()
+    problems: list[str] = []
+    for adjuster in machine.adjusters:
+        frames = {BASE}
+        for branch in (machine.chain.tool, machine.chain.workpiece):
+            if adjuster.body in branch:
+                frames = {(BASE, *branch)[branch.index(adjuster.body)], adjuster.body}
+        parts = [
+            place_points(motions[body.frame], body.vertices_mm, 0.0)
+            for body in bodies
+            if body.frame in frames
+        ]
+        if adjuster.at_mm is None or not parts:
+            continue
+        points, at = np.concatenate(parts), np.array(adjuster.at_mm)
+        low, high = points.min(axis=0), points.max(axis=0)
+        if np.any(at < low - OUTSIDE_MM) or np.any(at > high + OUTSIDE_MM):
+            box = " ".join(f"{a:g}…{b:g}" for a, b in zip(low.round(1), high.round(1), strict=True))
+            problems.append(
+                f"adjuster {adjuster.name}: at_mm = {list(adjuster.at_mm)} is outside its body;"
+                f" expected within x y z {box} mm"
+            )
+    return tuple(problems)
 
 
 def turning_frames(machine: Machine) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from warpspace.analysis.options import Option, options_of
-from warpspace.cli.file_arguments import DataFile, check_files, flag_of
+from warpspace.cli.file_arguments import DataFile, InputFile, check_files, flag_of
 from warpspace.cli.sampling_output import EXTRA_OPTIONS
 from warpspace.cli.shared_options import (
     SCENES,
@@ -72,6 +72,7 @@ def _click_option(option: Option) -> Callable[..., Any]:
     elif option.grammar is not None:
         traits |= {"metavar": option.grammar.metavar, "multiple": True, "required": option.required}
         traits["type"] = DataFile() if option.grammar.is_file else str
+        traits["type"] = InputFile() if option.grammar.is_extended else traits["type"]
         traits["help"] += " Repeatable." if option.grammar.many or option.grammar.each else ""
     elif option.choices:
         default = None if option.default is None else str(option.default)
@@ -120,7 +121,8 @@ def _runner(kind: "type[Analysis]", run_analysis: Callable[..., Any] | None) -> 
             print_json(document | ({"files": written_files} if "files" in document else {}))
             return
         print_blocks(result.blocks())
-        for path in filter(None, (*(written_files or [output]), csv_path, plot)):
+        updated = result.updated_files()
+        for path in filter(None, (*(written_files or [output]), csv_path, plot, *updated)):
             echo(f"wrote {path}")
 
     return run
@@ -194,7 +196,9 @@ def write_result(
 
         draw = resolve_name(result.drawn_by) if result.drawn_by else result_chart
         files[plot] = encode_figure(draw(result), Path(plot).suffix.lower().lstrip("."))
+    logs: dict[str | Path, str | bytes] = {**result.updated_files()}
     write_texts(files, force=force)
+    write_texts(logs, force=True)
     return written_files
 
 

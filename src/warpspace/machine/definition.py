@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from warpspace.exceptions import ChainError, UnknownNameError
+from warpspace.machine.adjusters import Adjuster
 from warpspace.machine.axes import (
     LINEAR_LETTERS,
     MAX_AXES,
@@ -202,6 +203,7 @@ class Machine:
     bodies: Mapping[str, BodySource] = field(default_factory=dict[str, BodySource])
     source: str = ""  # where its structure is published
     columns: Mapping[str, str] = field(default_factory=dict[str, str])  # names of axes in data
+    adjusters: tuple[Adjuster, ...] = ()
 
     def axis(self, name: str) -> Axis:
         try:

@@ -7,6 +7,8 @@ import sys
 # 100 mm in µm and 0.1 rad in µrad: no rigid-body model of small errors holds beyond
 MAX_ERROR = 1e5
 MAX_LENGTH_MM = 1e5  # of coordinates, offsets, travels (mm or degrees) and phases
+MAX_ADJUSTERS = 60
+PITCH_MM = (1e-3, 1e3)  # travel per turn of a screw
 GANTRY_SPAN_MM = (1.0, MAX_LENGTH_MM)  # between the two guides of a gantry
 FULL_TURN_DEG = 360.0  # of the fixed rotation of a frame
 MIN_SPAN = 1e-6  # millimetres or degrees: a range narrower than a nanometre is empty

@@ -1,13 +1,13 @@
 """Machines: bundled by name, or built from the table of a scene."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from warpspace.exceptions import ChainError, SceneError, UnknownNameError
-from warpspace.machine import definition
+from warpspace.machine import adjusters, definition
 from warpspace.machine.axes import direction_index, is_linear
 from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.resources import assets_dir
@@ -139,7 +139,8 @@ def read_machine(
     )
     _check_columns(section["columns"], chain.axes, f"{prefix}columns", problems)
     bodies = read_bodies(section["bodies"], machine, folder, problems)
-    return replace(machine, columns=section["columns"], bodies=bodies)
+    read = read_adjusters(section["adjusters"], machine, f"{prefix}adjusters", problems)
+    return replace(machine, columns=section["columns"], bodies=bodies, adjusters=read)
 
 
 def _check_columns(
@@ -171,3 +172,101 @@ def _gantries(
             across = entries["across"] or definition.default_across(axis)
             gantries[axis] = definition.Gantry(axis, entries["span_mm"], across)
     return gantries
+
+
+NOT_UNIT, ROUNDED = 1e-3, 1e-12  # deviations of the length of a direction from 1
+
+
+def read_adjusters(
+    tables: Sequence[Mapping[str, Any]],
+    machine: definition.Machine,
+    key: str,
+    problems: Problems,
+) -> tuple[adjusters.Adjuster, ...]:
+    """Build the adjusters of a machine; note those that are invalid or depend on each other."""
+    built: list[adjusters.Adjuster] = []
+    for index, table in enumerate(tables):
+        entries: dict[str, Any] = {**table, "kind": adjusters.AdjusterKind(table["kind"])}
+        direction = table["direction"]
+        if direction:
+            length = sum(part * part for part in direction) ** 0.5
+            if abs(length - 1.0) > NOT_UNIT:
+                problems.add(f"{key}[{index}].direction", "expected a unit vector", direction)
+                continue
+            if abs(length - 1.0) > ROUNDED:  # a written direction is read back as it is
+                entries["direction"] = tuple(part / length for part in direction)
+        adjuster = adjusters.Adjuster(**entries)
+        before = len(problems.lines)
+        for name, text, value in _adjuster_problems(adjuster, built, machine):
+            shown = ... if value is None else value
+            problems.add(f"{key}[{index}].{name}", f"{adjuster.name}: {text}", shown)
+        built += [adjuster] * (len(problems.lines) == before)
+    if len(built) == len(tables):
+        for text in _joint_problems(built):
+            problems.add(key, text)
+    return tuple(built)
+
+
+def _adjuster_problems(
+    adjuster: adjusters.Adjuster,
+    earlier: Sequence[adjusters.Adjuster],
+    machine: definition.Machine,
+) -> Iterator[tuple[str, str, object]]:
+    """List key, problem and value of what is wrong with one adjuster."""
+    kind, body = adjuster.kind, adjuster.body
+    linear = [axis for axis in machine.axes if is_linear(axis)]
+    bodies = {
+        adjusters.AdjusterKind.GIB: linear,
+        adjusters.AdjusterKind.RAIL_BOLT: linear,
+        adjusters.AdjusterKind.SCALE: linear,
+        adjusters.AdjusterKind.OFFSET: [axis for axis in machine.axes if axis not in linear],
+    }.get(kind, [adjusters.FRAME, *machine.axes])
+    if body not in bodies:
+        expected = f"expected one of {', '.join(bodies)}" if bodies else "no axis can have one"
+        yield "body", f"{kind}; {expected}", body
+    names = {name for other in earlier for name in (other.name, *other.groups)}
+    own_groups = {name for other in earlier for name in other.groups} & {*adjuster.groups}
+    twice = {adjuster.name, *adjuster.groups} & (names - own_groups)
+    if twice or adjuster.name in adjuster.groups:
+        yield "name", "expected names that no other adjuster or group has", adjuster.name
+    for name in ("at_mm", "direction"):
+        value = getattr(adjuster, name)
+        if kind.is_parameter != (value is None):
+            expected = "a parameter of the control has none" if kind.is_parameter else "is missing"
+            yield name, f"{kind}; {expected}", value
+    if bool(adjuster.pitch_mm) not in kind.pitches:
+        expected = "expected the travel per turn" if kind.pitches[0] else "expected none"
+        yield "pitch_mm", f"{kind}; {expected}", adjuster.pitch_mm
+    low, high = adjuster.range
+    if not low <= 0.0 <= high:
+        yield "range", "expected a range around 0, the present position", list(adjuster.range)
+    elif adjuster.steps == (0, 0):
+        yield "range", f"holds no step of {adjuster.step:g} {adjuster.unit}", list(adjuster.range)
+
+
+def _joint_problems(built: Sequence[adjusters.Adjuster]) -> Iterator[str]:
+    """List joints whose adjusters depend on each other, and groups of unlike adjusters."""
+    kinds = adjusters.AdjusterKind
+    for joint in dict.fromkeys(adjuster.joint for adjuster in built):
+        members = [adjuster for adjuster in built if adjuster.joint == joint]
+        names, kind = ", ".join(adjuster.name for adjuster in members), members[0].kind
+        if kind.is_parameter:
+            if len(members) > 1:
+                yield f"{names}: dependent; expected one {kind} of {joint[0]}"
+            continue
+        least = 2 if kind in (kinds.GIB, kinds.RAIL_BOLT) else 3
+        rows = adjusters.support_rows(members)
+        bends = kind is kinds.RAIL_BOLT or (joint[0] == adjusters.FRAME and len(members) > least)
+        if len(members) < least:
+            yield f"{names}: expected at least {least} adjusters under {joint[0]}"
+        elif adjusters.rank_of(members) < least:
+            yield f"{names}: dependent; expected {least} that are not in one place or line"
+        elif bends and rows is None:
+            yield (
+                f"{names}: expected one direction, and one or two rows of at least two supports"
+                " along x, y or z"
+            )
+    for group in dict.fromkeys(name for adjuster in built for name in adjuster.groups):
+        members = [adjuster for adjuster in built if group in adjuster.groups]
+        if len({(a.joint, a.kind, a.step, a.pitch_mm) for a in members}) > 1:
+            yield f"group {group}: expected adjusters of one body, kind, step and pitch_mm"

@@ -259,6 +259,10 @@ def _machine_sections(machine: Machine) -> list[str]:
         spell_section("machine.direction", direction),
         spell_section("machine.gantry", gantry),
         spell_section("machine.columns", machine.columns),
+        *(
+            spell_section("[machine.adjusters]", {k: v for k, v in asdict(one).items() if v})
+            for one in machine.adjusters
+        ),
     ]
 
 

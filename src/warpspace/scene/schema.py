@@ -11,6 +11,7 @@ from warpspace.exceptions import SHOWN_PROBLEMS, near_miss
 from warpspace.kinematics.conversion import SquarenessSign
 from warpspace.kinematics.model import ComponentErrors, Loop, convention_names
 from warpspace.machine import errors, limits
+from warpspace.machine.adjusters import AdjusterKind
 from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.curve import MISSING, Path, ValueReader
 from warpspace.machine.curves.table import MAX_COLUMN_NAME, MAX_FILE_NAME
@@ -201,6 +202,20 @@ GANTRY = TableSchema(
         "across": (_choice(lambda: "xyz"), None),
     }
 )
+_NAME = _text(100, 1, *_LINE)
+ADJUSTER = TableSchema(
+    {
+        "name": (_NAME, MISSING),
+        "body": (_text(8, 1), MISSING),
+        "kind": (_one_of(AdjusterKind), MISSING),
+        "step": (_number(1e-6, limits.MAX_LENGTH_MM), MISSING),
+        "range": (_span, MISSING),
+        "at_mm": (POINT, None),
+        "direction": (_numbers("[x, y, z]", *[limits.MAX_LENGTH_MM] * 3), None),
+        "pitch_mm": (_number(*limits.PITCH_MM), None),
+        "groups": (_list(_NAME, limits.MAX_ADJUSTERS), ()),
+    }
+)
 MACHINE = TableSchema(
     {
         "title": (TITLE, ""),
@@ -214,6 +229,7 @@ MACHINE = TableSchema(
         "gantry": (_by_name(GANTRY), {}),
         "columns": (_by_name(_text(20, 1, "[A-Za-z][A-Za-z0-9]*", "letters and digits")), {}),
         "bodies": (_by_name(lambda _reader, value, _path: value), {}),
+        "adjusters": (_list(ADJUSTER, limits.MAX_ADJUSTERS), ()),
     }
 )
 BODY = TableSchema(
@@ -369,6 +385,14 @@ def _band(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
     return -half_width, half_width
 
 
+def _before(reader: ValueReader, value: Any, path: Path) -> str | dict[str, float]:
+    if isinstance(value, str):
+        return _text(MAX_FILE_NAME, 1)(reader, value, path)
+    return _by_name(_number(-limits.MAX_ERROR, limits.MAX_ERROR))(reader, value, path)
+
+
+_DONE = TableSchema({"acts": (_by_name(LENGTH), MISSING), "before": (_before, MISSING)})
+DONE_ACTS = TableSchema({"done": (_list(_DONE, limits.MAX_NOTES), ())})
 LEAST_SQUARES, EXTREME_FITS = "least squares", ("inscribed", "circumscribed")
 FITS = LEAST_SQUARES, "minimum zone", *EXTREME_FITS
 _FEATURE = TableSchema(

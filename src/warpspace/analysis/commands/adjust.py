@@ -1,21 +1,41 @@
 """Adjustment: errors to adjust, and their new values, that reduce the volumetric error."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from dataclasses import field as attribute
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from warpspace.analysis import description
+from warpspace.analysis.act_planning import Act, Planner
+from warpspace.analysis.adjustment_log import (
+    Stiffness,
+    extend_log,
+    learn_stiffness,
+    read_log,
+    total_changes,
+)
 from warpspace.analysis.adjustment_search import Objective, Search, Volume
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
-from warpspace.analysis.options import ALL, LOOP_HELP, LOOP_UNSET, PLACED_HELP, Keys, Limits, option
+from warpspace.analysis.options import (
+    ALL,
+    LOOP_HELP,
+    LOOP_UNSET,
+    PLACED_HELP,
+    File,
+    Grammar,
+    Keys,
+    Limits,
+    option,
+    typed_word,
+)
 from warpspace.analysis.statistics import Summary, volume_statistics
 from warpspace.analysis.uncertainty import propagation
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import (
     ErrorBasis,
+    ErrorField,
     View,
     amplitudes_of,
     fit_placement,
@@ -25,7 +45,7 @@ from warpspace.field.evaluate import (
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import Parameter, parameter
-from warpspace.machine.errors import Tolerance
+from warpspace.machine.errors import ErrorSet, Tolerance
 from warpspace.machine.limits import MAX_ERROR, MAX_TEXT, MIN_HALF_WIDTH, REPAIR_COUNT, REPAIR_NODES
 from warpspace.scene.model import Scene, evaluate_grid, grid_basis, second_order, with_placement
 from warpspace.units import Array, spell, spell_fixed, spell_short
@@ -82,6 +102,42 @@ class AdjustedSet(Summary):
     proven: bool
     exact: Summary  # by the exact chain
 
+    @property
+    def size(self) -> int:
+        return len(self.adjust)
+
+    @property
+    def label(self) -> str:
+        if len(self.adjust) > MOST_VALUES:
+            return f"{len(self.adjust)} adjusted: {', '.join(self.adjust)}"
+        return ", ".join(f"{key} → {spell(value)}" for key, value in self.adjust.items())
+
+    def applied_to(self, scene: Scene) -> Scene:
+        return apply_adjustments(scene, self.adjust)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ActSet(AdjustedSet):
+    """Best acts on adjusters of one number, and the statistics of the volume after them."""
+
+    json_keys: ClassVar[tuple[str, ...]] = (
+        "acts", "adjust", *FOUR, "exact", "expanded_uncertainty",
+    )  # fmt: skip
+    acts: tuple[Act, ...]
+    errors: ErrorSet  # of the machine after them
+    error_um: Array = attribute(compare=False)  # [..., 3]; of the nodes, to first order
+
+    @property
+    def size(self) -> int:
+        return len(self.acts)
+
+    @property
+    def label(self) -> str:
+        return ", ".join(map(str, self.acts))
+
+    def applied_to(self, scene: Scene) -> Scene:
+        return replace(scene, title=f"{scene.title}, adjusted"[:MAX_TEXT], errors=self.errors)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Adjust(description.Analysis):
@@ -93,6 +149,10 @@ class Adjust(description.Analysis):
     Model: first order; the sets found are evaluated again with the exact chain. Each node of the
     grid weighs its share of the volume. Sets keep the tolerances of the scene and do not increase
     the mean.
+
+    If the machine has adjusters, sets are acts on them: whole steps of screws, shims and parameters
+    within their ranges, the best by mixed-integer programming. --adjustable or --limit names errors
+    instead.
     """
 
     name = "adjust"
@@ -134,6 +194,12 @@ class Adjust(description.Analysis):
         low=REPAIR_NODES[0],
         high=REPAIR_NODES[1],
     )
+    done: File = option(
+        None, "Log of the acts so far, TOML; SCENE was measured after the last of them"
+    )
+    log: Annotated[str | None, Grammar("FILE", typed_word, is_extended=True)] = option(
+        None, "Append the last acts listed, and the present errors, to this log"
+    )
 
     def run(
         self, scene: Scene, watch: description.ProgressCallback = description.ignore_progress, /
@@ -153,11 +219,12 @@ class Adjust(description.Analysis):
         off = bool(np.any(volume.error_um))
         sets: list[AdjustedSet] = []
         each = search = Search(volume, self.objective, bounds)
+        acts = self.uses_adjusters(scene)
         if not self.unconstrained:
             tolerated = self._within_tolerance(scene, basis.keys, amplitudes, bounds)
             search = replace(each, bounds=tolerated, mean_um=before.mean_um)
         candidates = tuple(index for index in candidates if np.ptp(search.bounds[index]))
-        for best, proven in search.best_sets(candidates if off else (), self.count):
+        for best, proven in search.best_sets(candidates if off and not acts else (), self.count):
             values = amplitudes[list(best.indices)] + best.change
             adjust = {basis.keys[i]: float(v) for i, v in zip(best.indices, values, strict=True)}
             numbers = volume.statistics(volume.changed(best.indices, values))
@@ -181,12 +248,81 @@ class Adjust(description.Analysis):
             second_order=second_order(scene, view.loop),
         )
         error = basis.evaluate(amplitudes, orientation=False).error_um
+        if acts:
+            result = self._with_acts(result, grid, error, watch)
         at = grid.coordinates, view, grid.point_mm, grid.weights
         uncertainty = propagation.field_uncertainty(scene, error, *at)
         return result if uncertainty is None else _with_uncertainty(result, uncertainty, basis)
 
     def included(self, scene: Scene) -> Sequence[str]:
         return scene.parameter_keys
+
+    def uses_adjusters(self, scene: Scene) -> bool:
+        for name in ("done", "log"):
+            if getattr(self, name) and (self.adjustable or self.limit):
+                raise OptionError(
+                    f"{{{name}}}: acts on adjusters; expected no {{adjustable}} or {{limit}}"
+                )
+            if getattr(self, name) and not scene.machine.adjusters:
+                raise OptionError(f"{{{name}}}: {scene.machine.title} has no adjusters")
+        return bool(scene.machine.adjusters) and not (self.adjustable or self.limit)
+
+    def _with_acts(
+        self,
+        result: "AdjustResult",
+        grid: Grid,
+        error_um: Array,
+        watch: description.ProgressCallback,
+    ) -> "AdjustResult":
+        scene, view = result.scene, result.view
+        entries = read_log(self.done, scene) if self.done else ()
+        stiffness = learn_stiffness(scene, entries, self.done or "")
+        factors = {name: learnt.factor for name, learnt in stiffness.items()}
+        done = total_changes(scene.machine.adjusters, entries)
+        excluded = {*scene.parameter_keys} - {*self.included(scene)}
+        largest_changes, idle, plans = Planner(scene, grid, view, factors, done, excluded).plan(
+            error_um,
+            self.objective,
+            self.count if error_um.any() else 0,
+            constrained=not self.unconstrained,
+            is_placement=lambda response: _is_placement(scene, grid, response),
+            advance=watch,
+        )
+        sets: list[ActSet] = []
+        for plan in plans:
+            field = ErrorField(grid.nominal_mm, plan.error_um, plan.error_um)
+            adjust = {
+                key: plan.errors.amplitude(key)
+                for key in plan.errors
+                if plan.errors.functions[key] != scene.errors.functions.get(key)
+            }
+            adjusted = replace(scene, errors=plan.errors)
+            exact = volume_statistics(evaluate_grid(adjusted, grid, view, exact=True), grid)
+            sets.append(
+                ActSet(
+                    *volume_statistics(field, grid).four,
+                    acts=plan.acts,
+                    adjust=adjust,
+                    errors=plan.errors,
+                    error_um=plan.error_um,
+                    proven=plan.proven,
+                    exact=Summary(*exact.four),
+                )
+            )
+        keys = dict.fromkeys(key for adjusted in sets for key in adjusted.adjust)
+        planned = replace(
+            result,
+            adjustments=tuple(sets),
+            adjustable=largest_changes,
+            present={key: scene.errors.amplitude(key) for key in keys},
+            idle=idle,
+            stiffness=tuple(stiffness.values()),
+        )
+        if not entries:
+            return planned
+        return LearnedResult(
+            **{entry.name: getattr(planned, entry.name) for entry in fields(planned)}
+        )
 
     def _within_tolerance(
         self, scene: Scene, keys: Sequence[str], amplitudes: Array, bounds: Array
@@ -223,6 +359,9 @@ class AdjustResult(description.Result):
     adjustments: tuple[AdjustedSet, ...]
     adjustable: Mapping[str, float]  # largest change of each error that was tried, µm or µrad
     present: Mapping[str, float]  # value of each of them now, µm or µrad
+    # of acts on adjusters; then `adjustable` has the largest change of each act, in its unit
+    idle: tuple[str, ...] = ()  # acts without an effect in this loop
+    stiffness: tuple[Stiffness, ...] = ()  # learned from the log
 
     @property
     def objective(self) -> Objective:
@@ -250,11 +389,24 @@ class AdjustResult(description.Result):
     def changes(self) -> Sequence[description.Change]:
         return [
             description.Change(
-                f"after adjustment: {_values(adjusted)}",
-                apply_adjustments(self.scene, adjusted.adjust),
+                f"after adjustment: {adjusted.label}",
+                adjusted.applied_to(self.scene),
+                tuple(map(str, adjusted.acts)) if isinstance(adjusted, ActSet) else (),
             )
             for adjusted in self.adjustments
         ]
+
+    @property
+    def is_acts(self) -> bool:
+        return self.analysis.uses_adjusters(self.scene)
+
+    def updated_files(self) -> Mapping[str, str]:
+        """Return the log with the proposed acts; empty without --log."""
+        if self.analysis.log is None or not self.adjustments:
+            return {}
+        last = self.adjustments[-1]
+        acts = last.acts if isinstance(last, ActSet) else ()
+        return {self.analysis.log: extend_log(self.analysis.log, self.scene, acts, last.adjust)}
 
     def blocks(self) -> Iterator[Block]:
         smallest = f"smallest {OBJECTIVE_WORDS[self.objective]}"
@@ -307,19 +459,57 @@ class AdjustResult(description.Result):
         if not self.before.max_um:
             yield "The error is zero everywhere in this loop: there is nothing to adjust."
             return
+        if not self.adjustments and self.is_acts:
+            yield "No act on an adjuster reduces the error within its range and the tolerances."
+            yield from self._act_remarks()
+            return
         if not self.adjustments:
             yield "No squareness or alignment acts in this loop; other errors can be adjusted."
             return
         columns = (
             Column("set", "d", leads=True),
             *number_columns(("mean", "RMS", "P95", "max"), unit="µm"),
-            Column("adjust", wraps=True),
+            Column("acts" if self.is_acts else "adjust", wraps=True),
         )
         rows = [
-            (len(adjusted.adjust), *adjusted.four, self._adjustments(adjusted))
+            (
+                adjusted.size,
+                *adjusted.four,
+                adjusted.label if self.is_acts else self._adjustments(adjusted),
+            )
             for adjusted in self.adjustments
         ]
         yield Table(columns, rows, title="Best sets of adjustments:")
+        yield from self._act_remarks() if self.is_acts else self._bounds()
+        worthwhile = self.worthwhile
+        idle = [str(i + 1) for i in range(len(self.adjustments)) if i not in worthwhile]
+        if idle:
+            yield (
+                f"  not proposed: set {', '.join(idle)} (gains less than {WORTHWHILE:.0%} of the"
+                f" {OBJECTIVE_WORDS[self.objective]} over smaller sets)"
+            )
+        sizes = [str(adjusted.size) for adjusted in self.adjustments if not adjusted.proven]
+        unproven = (
+            f"  sets of {', '.join(sizes)}: not proven to be the best in the time of the search"
+        )
+        yield (
+            "  all sets compared"
+            if not sizes
+            else unproven
+            if self.is_acts
+            else f"  sets of {', '.join(sizes)}: too many to compare all; built up one by one, with"
+            " members swapped as long as that helped"
+        )
+        name = f"{self.objective}_um"
+        exact: list[str] = []
+        for adjusted in self.adjustments:
+            um = getattr(adjusted.exact, name)
+            change = round(um - getattr(adjusted, name), 3) + 0.0
+            exact.append(f"set {adjusted.size}: {um:.3f} µm ({change:+.3f})")
+        heading = f"{OBJECTIVE_WORDS[self.objective]} by the exact chain (exact − first order)"
+        yield f"  {heading}: {', '.join(exact)}"
+
+    def _bounds(self) -> Iterator[str]:
         if len(set(self.adjustable.values())) == 1:
             bounds = f"each by at most ±{next(iter(self.adjustable.values())):g} µm or µrad"
         else:
@@ -330,28 +520,31 @@ class AdjustResult(description.Result):
             tolerance = ", within tolerance" if has_tolerances else ""
             bounds += f"{tolerance}, without a larger mean"
         yield f"  adjusted: {', '.join(self.adjustable)}; {bounds}"
-        worthwhile = self.worthwhile
-        idle = [str(i + 1) for i in range(len(self.adjustments)) if i not in worthwhile]
-        if idle:
-            yield (
-                f"  not proposed: set {', '.join(idle)} (gains less than {WORTHWHILE:.0%} of the"
-                f" {OBJECTIVE_WORDS[self.objective]} over smaller sets)"
-            )
-        sizes = [str(len(adjusted.adjust)) for adjusted in self.adjustments if not adjusted.proven]
-        yield (
-            "  all sets compared"
-            if not sizes
-            else f"  sets of {', '.join(sizes)}: too many to compare all; built up one by one, with"
-            " members swapped as long as that helped"
-        )
+
+    def _act_remarks(self) -> Iterator[str]:
         name = f"{self.objective}_um"
-        exact: list[str] = []
+        before = spell_fixed(getattr(self.before, name))
         for adjusted in self.adjustments:
-            um = getattr(adjusted.exact, name)
-            change = round(um - getattr(adjusted, name), 3) + 0.0
-            exact.append(f"set {len(adjusted.adjust)}: {um:.3f} µm ({change:+.3f})")
-        heading = f"{OBJECTIVE_WORDS[self.objective]} by the exact chain (exact − first order)"
-        yield f"  {heading}: {', '.join(exact)}"
+            after = spell_fixed(getattr(adjusted, name))
+            if f"u95_{name}" in adjusted.expanded_uncertainty:
+                u95 = adjusted.expanded_uncertainty[f"u95_{name}"]
+                after += f" {propagation.plus_minus(u95)}"
+            changes = ", ".join(
+                f"{key} {spell_fixed(self.present[key])} → {spell_fixed(new)} {parameter(key).unit}"
+                for key, new in adjusted.adjust.items()
+            )
+            objective = OBJECTIVE_WORDS[self.objective]
+            yield f"  set {adjusted.size}: {objective} {before} → {after} µm; {changes}"
+        for learnt in self.stiffness:
+            yield (
+                f"  {learnt.adjuster}: effect {learnt.factor:.2f} ± {learnt.u95:.2f} (U95) of the"
+                " geometric one"
+            )
+        if self.idle:
+            yield (
+                f"  no effect in this loop: {', '.join(self.idle)} (each moves tool and workpiece"
+                " together, or only the placement of the workpiece)"
+            )
 
     def _adjustments(self, adjusted: AdjustedSet) -> str:
         return ", ".join(
@@ -386,7 +579,7 @@ class AdjustResult(description.Result):
         return Bars(
             f"Adjustment · {self.scene.title}",
             " · ".join(where),
-            [*rows, *map(_values, sets)],
+            [*rows, *(adjusted.label for adjusted in sets)],
             panels,
             legend=(
                 ("before", "before"),
@@ -395,6 +588,12 @@ class AdjustResult(description.Result):
                 ("best set of adjustments", "set"),
             ),
         )
+
+
+class LearnedResult(AdjustResult):
+    """Acts with the stiffness of adjusters that a log reveals."""
+
+    json_keys = (*AdjustResult.json_keys, "stiffness")
 
 
 def apply_adjustments(scene: Scene, adjust: Mapping[str, float]) -> Scene:
@@ -407,9 +606,15 @@ def apply_adjustments(scene: Scene, adjust: Mapping[str, float]) -> Scene:
 def _with_uncertainty(
     result: AdjustResult, before: propagation.FieldUncertainty, basis: ErrorBasis
 ) -> AdjustResult:
-    def u95_after(adjust: Mapping[str, float]) -> description.ExpandedUncertainty[float | None]:
-        values = amplitudes_of(apply_adjustments(result.scene, adjust).errors, basis.keys)
-        after = replace(before, error_um=basis.evaluate(values, orientation=False).error_um)
+    def u95_after(
+        adjust: Mapping[str, float], adjusted: AdjustedSet | None = None
+    ) -> description.ExpandedUncertainty[float | None]:
+        if isinstance(adjusted, ActSet):
+            error_um = adjusted.error_um
+        else:
+            values = amplitudes_of(apply_adjustments(result.scene, adjust).errors, basis.keys)
+            error_um = basis.evaluate(values, orientation=False).error_um
+        after = replace(before, error_um=error_um)
         u95 = after.with_expanded_uncertainty(result.before).expanded_uncertainty
         if adjust:
             objective = f"{result.objective}_um"
@@ -426,7 +631,7 @@ def _with_uncertainty(
         before=replace(result.before, expanded_uncertainty=u95_after({})),
         errors=tuple(map(effect_with_u95, result.errors)),
         adjustments=tuple(
-            replace(step, expanded_uncertainty=u95_after(step.adjust))
+            replace(step, expanded_uncertainty=u95_after(step.adjust, step))
             for step in result.adjustments
         ),
     )
@@ -487,9 +692,3 @@ def _effect(search: Search, index: int) -> Effect:
         left_out=Summary(*out),
         best=Best(*improved, value=float(best[0])),
     )
-
-
-def _values(adjusted: AdjustedSet) -> str:
-    if len(adjusted.adjust) > MOST_VALUES:
-        return f"{len(adjusted.adjust)} adjusted: {', '.join(adjusted.adjust)}"
-    return ", ".join(f"{key} → {spell(value)}" for key, value in adjusted.adjust.items())

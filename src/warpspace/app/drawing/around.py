@@ -23,7 +23,7 @@ from warpspace.app.drawing.shapes import (
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import chosen_trace, points_on_traces
 from warpspace.app.evaluation.point_explanation import explain_point, measure_distance
-from warpspace.app.evaluation.scene_overlays import AT_LINE
+from warpspace.app.evaluation.scene_overlays import AT_LINE, planned_adjusters
 from warpspace.formats.source import MAX_LINES
 from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.geometry.surfaces import corners, round_down
@@ -38,6 +38,7 @@ TURNED = 0.014  # diameter of a traced point while the table rotates
 POINT_MARKER, AXIS_HALF, DASH = 0.011, 0.32, 0.02
 """Marker of the picked point, half length of the axis of rotation, dash of the lever."""
 RESIDUAL_HEAD, LONGEST_RESIDUAL = 0.025, 0.2
+ADJUSTER = 0.12  # length of the arrow of an adjuster
 MOST_OUTSIDE, OUTSIDE = 4000, 0.006  # marked points beyond the travel, and their size
 UNMEASURED, SEEN_THROUGH = 0.008, 0.5  # size of dots, and opacity of ellipsoids
 GREY = (70, 78, 90)
@@ -56,8 +57,8 @@ def draw_surroundings(picture: LivePicture) -> Shapes:
     """Draw everything of a picture except the box and the machine."""
     if picture.is_rotary:
         return _rotary_traces(picture)
-    draws = (_axes, _traces, _path, _part, _program, _other_side, _point, _measured, _marks,
-             _uncertainty)  # fmt: skip
+    draws = (_axes, _traces, _path, _part, _program, _other_side, _point, _adjusters, _measured,
+             _marks, _uncertainty)  # fmt: skip
     return {name: shape for draw in draws for name, shape in draw(picture).items()}
 
 
@@ -184,6 +185,18 @@ def _point(picture: LivePicture) -> Shapes:
             shapes["/why/axis"] = lines(axis, ACCENT, 3.5)
             shapes["/why/lever"] = lines(dashes(lever, DASH * size, 0.6 * DASH * size), ACCENT, 2.0)
     return shapes
+
+
+def _adjusters(picture: LivePicture) -> Shapes:
+    """Draw the adjusters of the planned acts as arrows of one length, along their travel."""
+    placed = planned_adjusters(picture.state)
+    if not placed:
+        return {}
+    start, along = (
+        np.array(part) for part in zip(*((at, way) for _, at, way in placed), strict=True)
+    )
+    pieces = arrows(start, start + ADJUSTER * picture.size_mm * along, HEAD * picture.size_mm)
+    return {"/adjusters/arrows": lines(pieces, ACCENT, 3.0)}
 
 
 def _measured(picture: LivePicture) -> Shapes:

@@ -12,6 +12,7 @@ import numpy as np
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import chosen_trace, drawn_bodies, tool_point
 from warpspace.app.evaluation.point_explanation import drawn_places, explain_point, measure_distance
+from warpspace.app.evaluation.scene_overlays import planned_adjusters
 from warpspace.app.state.app_state import Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.field.grid import Grid
@@ -130,7 +131,8 @@ def point_labels(picture: LivePicture) -> list[Label]:
         same_text = other.text.startswith(label.text.removeprefix("max "))
         if same_text and distance < TICK * picture.size_mm:
             worst = []
-    return [*worst, *point, *_measured(picture), *_names(picture), *_corners(picture)]
+    acts = [Label(text, at) for text, at, _ in planned_adjusters(picture.state) if text]
+    return [*worst, *point, *acts, *_measured(picture), *_names(picture), *_corners(picture)]
 
 
 def trace_label(picture: LivePicture, line: TraceLine) -> str:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpspace.acceptance_tests.acceptance import Acceptance
 from warpspace.acceptance_tests.plans import default_plan, load_plan
+from warpspace.analysis.commands.adjust import Adjust
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import TEST, option_values, read_form
@@ -167,6 +168,26 @@ def plan_test(test: BenchTest, scene: Scene) -> BenchPlan:
             f"{len(plan.point_mm):,} places; expected at most {MOST_SITES:,} in the app"
         )
     return plan
+
+
+def planned_adjusters(state: AppState) -> list[tuple[str, Array, Array]]:
+    """List the adjusters drawn while *Adjustment* is open: text, place, [3], mm, direction, [3].
+
+    The text is the act; it is empty for further members of a group.
+    """
+    page = state.page
+    if page.task != Adjust.task or Adjust.name not in page.open:
+        return []
+    return [
+        (
+            "" if index else str(act),
+            np.array(member.at_mm),
+            np.sign(act.change) * np.array(member.direction),
+        )
+        for act in page.acts
+        for index, member in enumerate(act.members)
+        if member in state.scene.machine.adjusters and not member.kind.is_parameter
+    ]
 
 
 def planned_tests(state: AppState) -> str | None:

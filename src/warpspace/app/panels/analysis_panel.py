@@ -94,7 +94,9 @@ class AnalysisPanel(Section):
 
     def options(self) -> Sequence[Option]:
         options = [o for o in self.kind.options() if o.name not in self.unsupported]
-        return [o for o in options if not (o.grammar and o.grammar.is_file)]
+        return [
+            o for o in options if not (o.grammar and (o.grammar.is_file or o.grammar.is_extended))
+        ]
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
         return self.options()
@@ -331,7 +333,7 @@ def _change_html(state: AppState, change: Change) -> Markup:
         if abs(b - a) > SAME:
             line = f"{key} {number(a)} → {number(b)} {parameter(key).unit}"
             moved.append((-abs(b - a), line))
-    steps = [line for _, line in sorted(moved)] or [change.label]
+    steps = [*change.steps, *(line for _, line in sorted(moved))] or [change.label]
     try:
         before, after = (PLAIN.evaluate(state).statistics for state in (before_state, after_state))
     except WarpspaceError:

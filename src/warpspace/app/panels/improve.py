@@ -6,12 +6,12 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 from markupsafe import Markup
 
 from warpspace.analysis.adjustment_search import Objective
-from warpspace.analysis.commands.adjust import Adjust
+from warpspace.analysis.commands.adjust import ActSet, Adjust, AdjustResult
 from warpspace.analysis.description import Analysis, Result
 from warpspace.analysis.options import Option
 from warpspace.analysis.registry import entries
@@ -20,7 +20,7 @@ from warpspace.app.browser.html import EMPTY
 from warpspace.app.browser.templates import Templates
 from warpspace.app.evaluation.compare import pinned_side, with_before, without_table
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.analysis_panel import AnalysisPanel, ResultKey
+from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import details_html, result_html
 from warpspace.app.panels.panel import Context, Refresh, on
 from warpspace.app.state.app_state import AppState
@@ -47,7 +47,7 @@ class AdjustIncluded(Adjust):
 class AdjustPanel(AnalysisPanel):
     """The best sets of adjustments, computed when the task is opened."""
 
-    runs_on_open, own_kind = True, AdjustIncluded
+    runs_on_open, own_kind, unsupported = True, AdjustIncluded, ("done", "log")
 
     def options(self) -> Sequence[Option]:
         changes = {"default": None, "choices": ("all",), "choice_labels": {"all": "any error"}}
@@ -69,6 +69,24 @@ class AdjustPanel(AnalysisPanel):
     def result_html(self, result: Result) -> Markup:
         blocks = (block for block in result.blocks() if not isinstance(block, str))
         return details_html(blocks, "Effect of each single error")
+
+    def _accept_outcome(self, outcome: AnalysisOutcome) -> None:
+        super()._accept_outcome(outcome)
+        offered = self.offered_changes(outcome.result)
+        self.context.post(lambda state: self._with_acts(state, offered[-1] if offered else -1))
+
+    def use_card(self, state: AppState, action: do.Preview | do.Apply) -> AppState | None:
+        used = super().use_card(state, action)
+        return used and self._with_acts(used, action.card)
+
+    def _with_acts(self, state: AppState, card: int) -> AppState:
+        """Select the plan whose acts are drawn."""
+        if self.outcome is None or self.name != Adjust.name:
+            return state
+        sets = cast("AdjustResult", self.outcome.result).adjustments
+        chosen = sets[card] if 0 <= card < len(sets) else None
+        acts = chosen.acts if isinstance(chosen, ActSet) else ()
+        return replace(state, page=replace(state.page, acts=acts))
 
 
 class BestPanel(AdjustPanel):

@@ -1,9 +1,10 @@
 """Display settings of field, machine, traces and page, and ranges and positions of the axes."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from warpspace.app.state.leaf import Span, described, error_names
+from warpspace.analysis.act_planning import Act
+from warpspace.app.state.leaf import Span, describe, described, error_names
 from warpspace.field.grid import slice_ranges
 from warpspace.machine import limits
 from warpspace.machine.definition import Vector
@@ -189,6 +190,7 @@ class PageLook:
     note_text: str = described("", "Text", kind="lines", hint="What is to be seen here?", linked="")
     author: str = described("", "Your name", hint="Kept in this browser", linked="")
     questions: str = described("", "Open questions", kind="lines", hint="One per line", linked="")
+    acts: tuple[Act, ...] = field(default=(), metadata=describe("Acts drawn on adjusters"))
 
 
 # --- Ranges and positions of the axes -------------------------------------------------------------

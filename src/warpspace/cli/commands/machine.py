@@ -155,11 +155,11 @@ def check(
 
 def _check(scene: "Scene", *, as_json: bool) -> None:
     from warpspace.analysis.note_tables import notes_table
-    from warpspace.bodies.mesh_files import check_meshes
+    from warpspace.bodies.placed import check_bodies
     from warpspace.cli.note_editing import notes_json
     from warpspace.scene.model import second_order
 
-    remarks = (*scene.notes, *check_meshes(scene.machine))
+    remarks = (*scene.notes, *check_bodies(scene.model))
     estimate = second_order(scene)
     shared_options.warn_second_order(estimate)
     non_zero = [key for key in scene.errors if scene.errors.amplitude(key) != 0.0]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from warpspace.analysis.commands.adjust import Adjust
+from warpspace.analysis.commands.adjust import ActSet, Adjust
 from warpspace.analysis.commands.concepts import LETTERS, Concept, compare_concepts
 from warpspace.bodies.placed import PlacedBody, place_bodies
 from warpspace.machine.axes import parameter
@@ -140,6 +140,8 @@ def draw_adjustment(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
             f"{key} {adjustment.present[key]:.3g} → {value:.3g} {parameter(key).unit}"
             for key, value in adjustment.adjustments[proposed].adjust.items()
         )
+        planned = adjustment.adjustments[proposed]
+        parts = planned.label if isinstance(planned, ActSet) else parts
         remark = f"adjusted for the smallest {adjustment.objective.upper()}: {parts}"
     after = replace(after, title="after", name=f"{scene.name}_adjusted")
     pair, title = (replace(scene, title="before"), after), f"Adjustment: {scene.title}"

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpspace.analysis.blocks import Column, Mark, Table, number_columns
-from warpspace.analysis.commands.adjust import Adjust, AdjustResult
+from warpspace.analysis.commands.adjust import ActSet, Adjust, AdjustResult
 from warpspace.analysis.commands.contributions import Contributions, Explanation, explain
 from warpspace.analysis.commands.gains import Gains
 from warpspace.analysis.commands.montecarlo import MonteCarlo
@@ -248,6 +248,8 @@ def _advice(picture: ScenePicture, adjustment: Result | str, settings: ReportSet
     if limit is not None and before <= limit:
         return "No adjustment required: the error is within the limit."
     if not isinstance(adjustment, AdjustResult) or not adjustment.adjustments:
+        if isinstance(adjustment, AdjustResult) and adjustment.is_acts:
+            return "No act on an adjuster reduces the error within its range and the tolerances."
         return "No adjustment possible: no squareness or alignment error acts in this loop."
     if not adjustment.worthwhile:
         return "No adjustment within tolerance reduces the RMS by 1 % or more."
@@ -268,6 +270,8 @@ def _advice(picture: ScenePicture, adjustment: Result | str, settings: ReportSet
         f" {spell_signed(value)} {parameter(key).unit}"
         for key, value in adjusted.adjust.items()
     )
+    if isinstance(adjusted, ActSet):
+        return f"Adjust {adjusted.label}, which changes {changes}: {effect}."
     return f"Adjust {changes}: {effect}."
 
 

@@ -1,0 +1,167 @@
+"""Plans of acts: whole steps of a few adjusters that reduce the volumetric error."""
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from warpspace.analysis.adjuster_effects import add_effects, adjuster_effects
+from warpspace.analysis.adjustment_search import SILENT, Objective, StepSearch, Volume
+from warpspace.field.evaluate import ErrorBasis, View
+from warpspace.field.grid import Grid
+from warpspace.machine.adjusters import Adjuster, spell_act
+from warpspace.machine.axes import parameter
+from warpspace.machine.errors import ErrorSet
+from warpspace.scene.model import Scene, evaluate_grid
+from warpspace.units import Array
+
+TOLERANCE_POSITIONS = 5  # along an axis at which a changed curve is compared with its tolerance
+
+
+@dataclass(frozen=True, slots=True)
+class Act:
+    """Change of an adjuster, or of all adjusters of a group by the same amount."""
+
+    json_keys: ClassVar[tuple[str, ...]] = ("adjuster", "change", "unit", "um")
+    adjuster: str  # its name, or that of the group
+    change: float
+    unit: str  # turn, mm, µm/m or µrad
+    um: float | None  # travel, µm; None for a parameter of the control
+    members: tuple[Adjuster, ...]
+
+    def __str__(self) -> str:
+        return spell_act(self.members[0], self.adjuster, self.change)
+
+
+class Plan(NamedTuple):
+    """Acts, the errors after them, and whether they are proven to be the best."""
+
+    acts: tuple[Act, ...]
+    errors: ErrorSet
+    error_um: Array  # [..., 3]; of the nodes, to first order
+    proven: bool
+
+
+@dataclass(frozen=True)
+class Planner:
+    """Acts that are possible on a machine, and their effect on its volume."""
+
+    scene: Scene
+    grid: Grid
+    view: View
+    factors: Mapping[str, float]  # effect of adjusters relative to the geometric one
+    done: Mapping[str, float]  # changes of adjusters so far
+    excluded: Collection[str] = ()  # errors that are not evaluated
+
+    def members_of_acts(self) -> dict[str, tuple[int, ...]]:
+        """List the adjusters of each possible act: one, or those of a group."""
+        members: dict[str, list[int]] = {}
+        for index, adjuster in enumerate(self.scene.machine.adjusters):
+            for name in (adjuster.name, *adjuster.groups):
+                members.setdefault(name, []).append(index)
+        return {name: tuple(indices) for name, indices in members.items()}
+
+    def plan(
+        self,
+        error_um: Array,
+        objective: Objective,
+        count: int,
+        *,
+        constrained: bool,
+        is_placement: Callable[[Array], Array],
+        advance: Callable[[float], None],
+    ) -> tuple[dict[str, float], tuple[str, ...], Iterator[Plan]]:
+        """Plan the best one, two, … acts for the errors of the nodes, [..., 3].
+
+        Return also the largest change of each act that is possible, and the names of adjusters
+        that have no effect in this view.
+        """
+        scene, adjusters = self.scene, self.scene.machine.adjusters
+        effects = [
+            ErrorSet({k: f for k, f in effect.functions.items() if k not in self.excluded})
+            for effect in adjuster_effects(scene, self.factors)
+        ]
+        fields = np.array(
+            [
+                adjuster.step
+                * evaluate_grid(replace(scene, errors=effect), self.grid, self.view).error_um
+                for adjuster, effect in zip(adjusters, effects, strict=True)
+            ]
+        )
+        acts = self.members_of_acts()
+        response = np.array([fields[list(members)].sum(axis=0) for members in acts.values()])
+        largest_um = np.abs(response).max(axis=(1, 2, 3, 4))
+        active = np.logical_and(largest_um > SILENT, np.logical_not(is_placement(response)))
+        idle = tuple(name for name, is_active in zip(acts, active, strict=True) if not is_active)
+        acts = {name: members for name, members in acts.items() if name not in idle}
+        ranges = np.array([self._steps_left(adjuster) for adjuster in adjusters])
+        bounds = np.array(
+            [(ranges[list(m), 0].max(), ranges[list(m), 1].min()) for m in acts.values()]
+        ).reshape(-1, 2)
+        position = np.concatenate([error_um[None], response[active]])
+        basis = ErrorBasis(("present", *acts), self.grid.nominal_mm, position, position)
+        volume = Volume(basis, self.grid, np.eye(len(position))[0])
+        share = np.array(
+            [[float(index in members) for members in acts.values()] for index in range(len(ranges))]
+        ).reshape(len(ranges), len(acts))
+        rows, limits, mean_um = share, ranges, np.inf
+        if constrained:
+            changes, allowed = self._tolerance_conditions(effects)
+            steps = np.array([adjuster.step for adjuster in adjusters])
+            rows = np.concatenate([rows, changes @ (steps[:, None] * share)])
+            limits = np.concatenate([limits, allowed])
+            mean_um = volume.mean((), np.zeros(0))[0]
+        search = StepSearch(volume, objective, bounds, rows, limits, mean_um)
+
+        def plans() -> Iterator[Plan]:
+            for steps, proven in search.best_sets(count, advance) if acts else ():
+                changes = share @ steps * [adjuster.step for adjuster in adjusters]
+                chosen = tuple(
+                    self._act(name, members, number)
+                    for (name, members), number in zip(acts.items(), steps.tolist(), strict=True)
+                    if number
+                )
+                errors = add_effects(scene, effects, changes.tolist())
+                after_um = error_um + np.tensordot(steps, response[active], 1)
+                yield Plan(chosen, errors, after_um, proven)
+
+        largest_steps = np.abs(bounds).max(axis=1, initial=0.0)
+        largest_changes = {
+            name: float(number) * adjusters[members[0]].step
+            for (name, members), number in zip(acts.items(), largest_steps, strict=True)
+        }
+        return largest_changes, idle, plans()
+
+    def _act(self, name: str, members: Sequence[int], steps: float) -> Act:
+        adjusters = tuple(self.scene.machine.adjusters[index] for index in members)
+        change = round(steps * adjusters[0].step, 9)
+        um = None if adjusters[0].kind.is_parameter else change * adjusters[0].travel_per_unit
+        return Act(name, change, adjusters[0].unit, um, adjusters)
+
+    def _steps_left(self, adjuster: Adjuster) -> tuple[float, float]:
+        done = self.done.get(adjuster.name, 0.0)
+        low, high = (end - done for end in adjuster.range)
+        remaining = replace(adjuster, range=(min(low, 0.0), max(high, 0.0)))
+        return float(remaining.steps[0]), float(remaining.steps[1])
+
+    def _tolerance_conditions(self, effects: Sequence[ErrorSet]) -> tuple[Array, Array]:
+        """Return the change of each toleranced value by each adjuster, [R, J], and its limits.
+
+        New values are within tolerance, or nearer to it than the present ones.
+        """
+        scene, rows, limits = self.scene, list[Array](), list[tuple[float, float]]()
+        for key in dict.fromkeys(key for effect in effects for key in effect):
+            tolerance, row = scene.tolerances.get(key), parameter(key)
+            if tolerance is None:
+                continue
+            count = 1 if row.is_constant else TOLERANCE_POSITIONS
+            at = np.linspace(*scene.axis_span(row.axis), count)
+            present = np.broadcast_to(scene.errors.evaluate(key, at), at.shape)
+            change = np.array([np.broadcast_to(e.evaluate(key, at), at.shape) for e in effects])
+            for value, slope in zip(present.tolist(), change.T, strict=True):
+                away = tolerance.centre - value
+                width = tolerance.half_width
+                limits.append((min(away - width, 0.0), max(away + width, 0.0)))
+                rows.append(slope)
+        return np.array(rows).reshape(-1, len(effects)), np.array(limits).reshape(-1, 2)
