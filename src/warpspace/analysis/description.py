@@ -88,6 +88,10 @@ class Result(ABC):
         """Return the files that -o writes, by the suffix added to its name: "", "_X.COM"."""
         return {}
 
+    def named_files(self) -> Mapping[str, str]:
+        """Return the new files that options other than -o name, by path."""
+        return {}
+
     def as_json(self) -> dict[str, Any]:
         """Return the object that ``--json`` prints."""
         extra = {"second_order_um": self.second_order.um} if self.second_order else {}

@@ -36,12 +36,12 @@ from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import read_readings
 from warpspace.calibration.solve import CheckCancelled, never_cancelled, read_keys, rms_mm
 from warpspace.exceptions import OptionError, SceneError
+from warpspace.parts.inspection_report import MAX_SESSION_U
 from warpspace.parts.workpiece import read_place
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM
 
 MAX_NEXT = 10
-MAX_SESSION_U = 1e4
 AS_WELL = 1.2  # residuals in the other sense of an axis, relative to those in its own, at most
 NO_RESIDUAL_MM = 1e-4
 Budget: TypeAlias = Annotated[Instrument, Grammar("NAME|FILE.toml", load_instrument, is_file=True)]
