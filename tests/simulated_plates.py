@@ -40,9 +40,7 @@ def drilled(scene: Scene, holes: np.ndarray, place=(0.0, 0.0, 0.0)) -> np.ndarra
     return holes + 1e-3 * field.error_um[:, :2]
 
 
-def measured(
-    actual: np.ndarray, rng, noise_um: float = 5.0, session_u: float = 10.0
-) -> np.ndarray:
+def measured(actual: np.ndarray, rng, noise_um: float = 5.0, session_u: float = 10.0) -> np.ndarray:
     """Measure a plate: another part of its own shape, placed at random on the measuring machine."""
     scale_x, scale_y, square = rng.normal(0.0, session_u * 1e-6, 3)
     x, y = actual.T
@@ -60,5 +58,8 @@ def report_text(holes: np.ndarray, read: np.ndarray, number: int = 1, digits: in
         error = actual - nominal
         cells = (*actual, *nominal, *error)
         rest = (2.174, 2.167, 0.003 + 0.001 * (at % 5))
-        lines.append("".join(f"{v:10.{digits}f}" for v in cells) + "".join(f"{v:8.3f}" for v in rest))
+        lines.append(
+            "".join(f"{v:{digits + 7}.{digits}f}" for v in cells)
+            + "".join(f"{v:8.3f}" for v in rest)
+        )
     return "\r\n".join([*lines, ""])

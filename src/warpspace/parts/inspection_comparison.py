@@ -25,7 +25,7 @@ from warpspace.analysis.uncertainty.propagation import (
 from warpspace.exceptions import SceneError
 from warpspace.kinematics import transforms
 from warpspace.machine.limits import MAX_SCENE_BYTES
-from warpspace.parts.inspection import find_features
+from warpspace.parts.inspection import KINDS, find_features
 from warpspace.parts.inspection_report import InspectionReport
 from warpspace.parts.part_shape import PartShape, align
 from warpspace.parts.workpiece import (
@@ -39,6 +39,7 @@ from warpspace.scene.model import Scene
 from warpspace.scene.text_files import read_text
 from warpspace.units import MM_PER_UM, UM_PER_MM, Array
 
+ROUND = KINDS["diameter"].features
 NEAR_MM = 0.1  # distance of a nominal hole from the feature that it is, at most
 SEALED = "measurand", "unit", "predicted", "u95_predicted"
 DIGITS = 4  # of sealed numbers, µm and µrad
@@ -94,7 +95,7 @@ def predict_features(
     noise_um: float,
 ) -> PredictedHoles:
     """Predict the holes of a report by the cylinders and spheres of a mesh at their centres."""
-    features = [x for x in find_features(fine, noise_um).values() if x.shape.radius_mm]
+    features = [x for x in find_features(fine, noise_um).values() if x.shape.kind in ROUND]
     size, matches = report.dimension, list[Any]()
     for row, point in enumerate(report.nominal_mm):
         away = {
@@ -235,7 +236,7 @@ def seal_prediction(
         sha256 = str(sealed.pop("sha256"))
         lines = [(str(name), unit, *numbers) for name, unit, *numbers in sealed["predicted"]]
     except (ValueError, TypeError, LookupError, AttributeError, RecursionError):
-        raise SceneError(path, ["is no sealed prediction; expected another {seal}"]) from None
+        raise SceneError(path, ["is no sealed prediction; expected another name"]) from None
     if _hash(sealed) != sha256:
         problem = "its content does not have the SHA-256 that it states: it was altered"
         return Seal(path, "altered", sha256, (problem,))

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpspace.parts.inspection_report import InspectionReport
 from warpspace.units import MM_PER_UM, Array
@@ -61,13 +62,14 @@ class PartShape:
         """Least squares of the placement alone, [p, n·d], and of the shape with it, [s, n·d]."""
         placement, _ = self.columns
         both = np.hstack(self.columns)
-        scale = np.linalg.norm(both, axis=0)
-        inverse = np.linalg.pinv(both / scale, rcond=RANK_TOLERANCE) / scale[:, None]
-        return np.linalg.pinv(placement, rcond=1e-12), inverse[placement.shape[1] :]
+        scale = np.maximum(np.linalg.norm(both, axis=0), 1e-12)
+        inverse: Array = np.linalg.pinv(both / scale, rcond=RANK_TOLERANCE) / scale[:, None]
+        alone: Array = np.linalg.pinv(placement, rcond=1e-12)
+        return alone, inverse[placement.shape[1] :]
 
     @cached_property
-    def is_estimable(self) -> Array:
-        """Numbers of the shape that the points determine, [s], booleans."""
+    def is_estimable(self) -> NDArray[np.bool_]:
+        """Numbers of the shape that the points determine, [s]."""
         count = len(self.names)
         resolution = (self.inverses[1] @ np.hstack(self.columns))[:, -count:]
         return np.abs(np.diagonal(resolution) - 1.0) < RANK_TOLERANCE

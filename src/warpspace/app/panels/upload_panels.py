@@ -36,6 +36,8 @@ from warpspace.formats.to_scene import ImportedScene, build_imported_scene
 from warpspace.kinematics import transforms
 from warpspace.machine.axes import is_linear, parameter
 from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
+from warpspace.parts.inspection_report import InspectionReport, parse_report
+from warpspace.parts.part import PartResult
 from warpspace.parts.workpiece import load_workpiece, place_workpiece
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import decode_text
@@ -299,21 +301,29 @@ class PartPanel(SceneOverlayPanel):
     """A workpiece: its placement, and an inspection of it as machined."""
 
     part_fields = ("mesh", "name")
-    unsupported = ("place", "predistorted")
+    unsupported = ("place", "predistorted", "seal")
     _sent: tuple[str, bytes] | None = None  # read again with another unit
 
     def inputs(self, state: AppState) -> Mapping[str, Any]:
         (scene_part, _), part = PartLook.of_scene(state.scene), state.part
         features = state.scene.part.path("features") if part.mesh is scene_part.mesh else None
-        tolerances = next(((file.name, file.content) for file in self.files), None)
-        files = {"features": features, "tolerances": tolerances}
+        reports = [file.content for file in self.files if not isinstance(file.content, str)]
+        texts = [(file.name, file.content) for file in self.files if file.content not in reports]
+        files = {"features": features, "tolerances": next(iter(texts), None)}
+        files["report"] = next(iter(reports), None)
         return {"place": part.place, "mesh": part.mesh, **files}
+
+    def is_ready(self, state: AppState) -> bool:
+        reports = (file for file in self.files if not isinstance(file.content, str))
+        return super().is_ready(state) or any(reports)
 
     def about(self, state: AppState) -> Markup:
         return HTML.part(partial(setting, state), MAX_SCENE_BYTES)
 
     def result_html(self, result: description.Result) -> Markup:
-        *_, features = (block for block in result.blocks() if isinstance(block, Table))
+        *_, features = result.blocks_of(Table)
+        if not isinstance(result, PartResult):
+            return super().result_html(result)
         verdicts = [(name, verdict) for name, *_, verdict, _ in features.rows if verdict]
         return HTML.verdicts(verdicts) + super().result_html(result)
 
@@ -332,15 +342,27 @@ class PartPanel(SceneOverlayPanel):
         return super().set_option(state, action)
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
-        """Parse tolerances, or a mesh; a mesh of another name is placed at the centre."""
+        """Parse tolerances, a report, or a mesh; a mesh of another name is placed at the centre."""
+        if not name.lower().endswith((".toml", *IN_BOX[self.name])):
+            text, notes = decode_text(content, name)
+            return partial(self._show_report, name, parse_report(text, name, notes))
         if name.lower().endswith(".toml"):
             text = upload_text(content, name, "tolerance file")
-            return partial(self.set_files, (UploadedFile(name, text),))
+            return partial(self._set_file, UploadedFile(name, text))
         self._sent, state = (name, content), self.context.state
         mesh = load_workpiece(name, option_values(state, self.name).get("unit") or None, content)
         present_place = state.part.place if name == state.part.name else None
         place = np.round(place_workpiece(mesh, state.standing, present_place).place, 3)
         return partial(self.show, mesh, name, place=tuple(place.tolist()))
+
+    def _set_file(self, uploaded: UploadedFile) -> None:
+        kind = type(uploaded.content)  # tolerances and a report are used together
+        others = (file for file in self.files if not isinstance(file.content, kind))
+        self.set_files((*others, uploaded))
+
+    def _show_report(self, name: str, report: InspectionReport) -> None:
+        self._set_file(UploadedFile(name, report, f"{len(report.names)} holes"))
+        self.context.post(lambda state: with_section(state, self.task, self.name))
 
 
 class ProgramPanel(SceneOverlayPanel):
