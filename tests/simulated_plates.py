@@ -4,10 +4,14 @@ The layout is drawn at random, as that of the drilled plates; the positions of t
 the exact chain of the machine, not from the first-order model that a comparison uses.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from warpspace.bench.placing import follow
 from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, Ramp
+from warpspace.scene.library import load_scene
 from warpspace.scene.model import Scene, evaluate
 
 MACHINE = """title = "drilling machine"
@@ -21,12 +25,12 @@ Z = [-100, 100]
 HEADER = "    Meas X    Meas Y     Nom X     Nom Y     Err X     Err Y  Meas D   Nom D   Round"
 
 
-def layout(count: int = 82, seed: int = 0) -> np.ndarray:
+def layout(count: int = 82, seed: int = 0, radius_mm: float = 320.0) -> np.ndarray:
     """Return nominal holes, [count, 2], mm, at least 15 mm apart."""
     rng, holes = np.random.default_rng(seed), np.zeros((0, 2))
     while len(holes) < count:
-        hole = rng.uniform(-320.0, 320.0, 2).round(3)
-        if np.hypot(*hole) < 320.0 and np.all(np.hypot(*(holes - hole).T) > 15.0):
+        hole = rng.uniform(-radius_mm, radius_mm, 2).round(3)
+        if np.hypot(*hole) < radius_mm and np.all(np.hypot(*(holes - hole).T) > 15.0):
             holes = np.vstack([holes, hole])
     return holes
 
@@ -63,3 +67,20 @@ def report_text(holes: np.ndarray, read: np.ndarray, number: int = 1, digits: in
             + "".join(f"{v:8.3f}" for v in rest)
         )
     return "\r\n".join([*lines, ""])
+
+
+def bundled_plates() -> dict[str, str]:
+    """Write the plates of `assets/measurements/simulated_plates`, by file name."""
+    scene = load_scene("dvf5000_nominal")
+    curves: dict[str, ErrorFunction] = {
+        "EXX": Ramp(scene.axis_span("X"), 6.0),
+        "EYY": Ramp(scene.axis_span("Y"), -4.0),
+        "EC0Y": Constant((0.0, 1.0), 60.0),
+    }
+    machine = replace(scene, errors=ErrorSet(curves))
+    holes, rng = layout(60, 1, 200.0), np.random.default_rng(11)
+    actual = drilled(machine, holes, (0.0, 0.0, 120.0))
+    return {
+        f"plate_{number}.txt": report_text(holes, measured(actual, rng, 3.0, 8.0), number)
+        for number in (1, 2, 3)
+    }

@@ -430,7 +430,7 @@ def session_blocks(sessions: Mapping[str, Any]) -> Iterator[Block]:
     variation = sessions["between_parts"]
     u, dof = variation["standard_uncertainty"], variation["degrees_of_freedom"]
     if u is not None:
-        extent = "" if dof is None else f", {dof:.0f} degrees of freedom"
+        extent = "" if dof is None else f", {dof} degrees of freedom"
         yield f"  variation between parts ({variation['source']}): u = {u:.1f} µm/m, µrad{extent}"
     for row in sessions["sessions"] if u is not None else ():
         numbers = ", ".join(f"{value:+.1f}" for value in row["term"].values())

@@ -151,8 +151,8 @@ class SessionTerms:
     def of(cls, fit: "Fit") -> "SessionTerms | None":
         """Estimate the variation by moments: squared terms less their variance from the scatter.
 
-        The numbers of the shape are pooled. Degrees of freedom: those of the sum, reduced by the
-        variance that is subtracted (Satterthwaite).
+        The numbers of the shape are pooled. The degrees of freedom are reduced by the variance that
+        is subtracted, so that those of the sum are 3·(m − 1), also where no variation is seen.
         """
         parts = [readings for readings in fit.model.sets if readings.part]
         if not parts:
@@ -174,9 +174,8 @@ class SessionTerms:
             return cls(labels, table, stated, np.inf, "stated")
         if not free:
             return cls(labels, table, None, np.inf, "unknown")
-        total = float(values @ values)
-        variance = max(total - scatter, 0.0) / free
-        dof = free * (1.0 - scatter / total) ** 2 if variance else np.inf
+        total = max(float(values @ values), scatter * (1.0 + 1e-6))
+        variance, dof = (total - scatter) / free, free * (1.0 - scatter / total) ** 2
         return cls(labels, table, float(np.sqrt(variance)), dof, "estimated")
 
     def columns(self, sets: Sequence[Readings]) -> Array:
@@ -199,7 +198,9 @@ class SessionTerms:
     def as_json(self, fit: "Fit") -> dict[str, Any]:
         variation = {
             "standard_uncertainty": self.u,
-            "degrees_of_freedom": self.dof if np.isfinite(self.dof) else None,
+            "degrees_of_freedom": self.values.size - self.values.shape[1]
+            if self.source == "estimated"
+            else None,
             "source": self.source,
         }
         rows = {"sessions": self._session_rows(fit), "shape": self._shape_rows(fit)}

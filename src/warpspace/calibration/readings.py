@@ -210,15 +210,6 @@ class Readings:
         return len(self.lines)
 
 
-def find_data(name: str) -> Path:
-    """Find a file of readings: a path, or the name of a bundled one such as ``tcp_on.csv``."""
-    path = Path(name)
-    if path.exists() or path.name != name:
-        return path
-    bundled = sorted((assets_dir() / "measurements").glob(f"*/{name}"))
-    return bundled[0] if bundled else path
-
-
 def bundled_data() -> tuple[str, ...]:
     return tuple(path.name for path in sorted((assets_dir() / "measurements").glob("*/*.csv")))
 

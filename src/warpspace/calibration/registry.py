@@ -24,13 +24,13 @@ from warpspace.calibration.readings import (
     Readings,
     ReadingTable,
     check_spread,
-    find_data,
     parse_reading_table,
 )
 from warpspace.calibration.spheres import SphereKind, SphereTcp
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.machine.limits import MAX_CSV_BYTES, MAX_ERROR
 from warpspace.parts.inspection_report import is_report
+from warpspace.resources import find_data
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import parse_number, read_table_text
 from warpspace.units import MM_PER_UM, Array

@@ -14,6 +14,7 @@ import numpy as np
 
 from warpspace.exceptions import SceneError
 from warpspace.machine.limits import MAX_CSV_BYTES, MAX_CSV_LINE, MAX_ERROR, MAX_LENGTH_MM
+from warpspace.resources import find_data
 from warpspace.scene.text_files import (
     LENGTH_UM,
     MAX_PREAMBLE,
@@ -92,8 +93,9 @@ def is_report(text: str) -> bool:
 
 def load_report(name: str | Path, *, nominal_only: bool = False) -> InspectionReport:
     """Read a report: a text table, CSV or a spreadsheet; see `parse_report`."""
-    text, notes = read_table_text(Path(name), MAX_CSV_BYTES)
-    return parse_report(text, str(name), notes, nominal_only=nominal_only)
+    path = find_data(str(name))
+    text, notes = read_table_text(path, MAX_CSV_BYTES)
+    return parse_report(text, str(path), notes, nominal_only=nominal_only)
 
 
 def parse_report(
