@@ -57,7 +57,7 @@ def measured(actual: np.ndarray, rng, noise_um: float = 5.0, session_u: float = 
 
 def report_text(holes: np.ndarray, read: np.ndarray, number: int = 1, digits: int = 3) -> str:
     """Write a report as the measuring shop does: title, date, a table with Windows line ends."""
-    lines = [f"Plug Plate: {number}", "Date: 2026-10-14", "", HEADER]
+    lines = [f"Plug Plate: {number}", "Date: 2026-10-14", "Units: mm", "", HEADER]
     for at, (nominal, actual) in enumerate(zip(holes, read, strict=True)):
         error = actual - nominal
         cells = (*actual, *nominal, *error)

@@ -9,7 +9,7 @@ import trimesh
 from click.testing import CliRunner
 
 from bench_scenes import scene_with
-from simulated_plates import layout, measured, report_text
+from simulated_plates import bundled_plates, layout, measured, report_text
 from warpspace.analysis.description import ignore_progress
 from warpspace.cli.analyses import command_of
 from warpspace.cli.file_arguments import guarded
@@ -19,6 +19,7 @@ from warpspace.parts.inspection_report import is_report, load_report, parse_repo
 from warpspace.parts.part import Part
 from warpspace.parts.part_shape import PartShape, align
 from warpspace.parts.workpiece import load_workpiece
+from warpspace.resources import assets_dir
 from warpspace.scene.library import load_scene, parse_scene
 from workbooks import xlsx
 
@@ -314,3 +315,9 @@ def test_a_report_alone_is_compared_although_the_scene_has_a_part(files):
     assert len(result.measured) == 43
     with pytest.raises(SceneError, match="outside the part"):
         Part(measured=str(files / "small.txt")).run(scene, ignore_progress)
+
+
+def test_bundled_plates_are_those_that_are_simulated():
+    folder = assets_dir() / "measurements" / "simulated_plates"
+    for name, text in bundled_plates().items():
+        assert (folder / name).read_bytes().decode() == text
