@@ -129,8 +129,8 @@ def couple_parts(sets: Sequence[Readings]) -> tuple[Readings, ...]:
         raise OptionError("{data}: reports with and without Z; expected the same coordinates")
     coupled = list(sets)
     for at, label in zip(indices, labels, strict=True):
-        others = tuple((other, -1.0) for other in labels[:-1])
-        terms = others if label == labels[-1] else ((label, 1.0),)
+        negative = tuple((other, -1.0) for other in labels[:-1])
+        terms = negative if label == labels[-1] else ((label, 1.0),)
         readings = sets[at]
         part = replace(_part(readings), terms=terms)
         coupled[at] = replace(readings, part=part, session=(label,) * len(readings))

@@ -1,4 +1,4 @@
-"""Comparison of an inspection report with the prediction for a machine, and its seal.
+"""ReportComparison of an inspection report with the prediction for a machine, and its seal.
 
 All measurands are linear in the deviations of the holes: their coordinates after the best-fit
 placement of the report, and the shape of the part with placement free (`PartShape`). The same
@@ -62,12 +62,12 @@ class Measurand:
 
 @dataclass(frozen=True, eq=False)
 class PredictedHoles:
-    """Predicted deviations of the holes of a report, in its frame."""
+    """Predicted deviations of the holes of a report, in its frame: x, y, z and diameter."""
 
-    error_um: Array  # [n, 3]
-    diameter_um: Array | None  # [n]; None without a mesh
-    response: Array | None  # [K, n, 4], of these to uncertain errors; None where not stated
+    deviation_um: Array  # [n, 4]
+    response: Array | None  # [K, n, 4], to uncertain errors; None where not stated
     errors: ErrorUncertainty | None
+    has_diameters: bool
 
 
 def predict_points(
@@ -79,11 +79,14 @@ def predict_points(
     actual = evaluate_points(scene, placed.vertices_mm)
     turn = transforms.placed(placed.place[:3], placed.place[3:])[:3, :3]
     uncertainty = point_uncertainty(scene, actual)
-    response = None
-    if uncertainty is not None:
-        response = np.pad(uncertainty.response @ turn, ((0, 0), (0, 0), (0, 1)))
+    response = None if uncertainty is None else _four(uncertainty.response @ turn)
     errors = uncertainty.errors if uncertainty else None
-    return PredictedHoles(actual.error_um @ turn, None, response, errors), placed, actual
+    return PredictedHoles(_four(actual.error_um @ turn), response, errors, False), placed, actual
+
+
+def _four(vectors: Array) -> Array:
+    """Append zeros to vectors, [..., d], up to four numbers of a hole."""
+    return np.pad(vectors, [*[(0, 0)] * (vectors.ndim - 1), (0, 4 - vectors.shape[-1])])
 
 
 def predict_features(
@@ -96,35 +99,30 @@ def predict_features(
 ) -> PredictedHoles:
     """Predict the holes of a report by the cylinders and spheres of a mesh at their centres."""
     features = [x for x in find_features(fine, noise_um).values() if x.shape.kind in ROUND]
-    size, matches = report.dimension, list[Any]()
+    shapes, size, matches = [feature.shape for feature in features], report.dimension, list[int]()
     for row, point in enumerate(report.nominal_mm):
-        away = {
-            float(
-                np.linalg.norm(((feature.shape.centre_mm - point) @ feature.shape.across)[:size])
-            ): feature
-            for feature in features
-        }
+        gaps = [((shape.centre_mm - point) @ shape.across)[:size] for shape in shapes]
+        away = [float(np.linalg.norm(gap)) for gap in gaps]
         nearest = min(away, default=np.inf)
         if nearest > NEAR_MM:
             at = ", ".join(f"{value:.6g}" for value in point[:size])
             problem = f"line {report.lines[row]}: {report.names[row]} at {at} mm is no feature"
             expected = f"expected a cylinder or sphere of {fine.name} within {NEAR_MM:g} mm"
             raise SceneError(report.source, [f"{problem} (features outside the part); {expected}"])
-        matches.append(away[nearest])
+        matches.append(away.index(nearest))
     turn = transforms.placed(placed.place[:3], placed.place[3:])[:3, :3]
 
     def follow(move_um: Array) -> Array:
-        motions = [(feature.shape, feature.follow(move_um)) for feature in matches]
+        motions = {at: features[at].follow(move_um) for at in {*matches}}
         rows = [
-            np.column_stack([motion.shift_mm, 2.0 * (motion.radius_mm - shape.radius_mm)])
-            for shape, motion in motions
+            np.column_stack([motions[at].shift_mm, 2.0 * motions[at].radius_mm]) for at in matches
         ]
         return np.stack(rows, axis=1) * UM_PER_MM
 
-    deviation = follow(actual.error_um[None] @ turn)[0]
-    response = follow(uncertainty.response @ turn) if uncertainty else None
-    errors = uncertainty.errors if uncertainty else None
-    return PredictedHoles(deviation[:, :3], deviation[:, 3], response, errors)
+    nominal = follow(np.zeros((1, *actual.error_um.shape)))
+    deviation = follow(actual.error_um[None] @ turn) - nominal
+    response = follow(uncertainty.response @ turn) - nominal if uncertainty else None
+    return PredictedHoles(deviation[0], response, uncertainty and uncertainty.errors, True)
 
 
 def compare_report(
@@ -141,54 +139,41 @@ def compare_report(
     size, count = report.dimension, len(report.names)
     shape = PartShape(report.nominal_mm, size)
     present = np.flatnonzero(shape.is_estimable)
+    has_diameters = holes.has_diameters and report.diameter_mm is not None
 
-    def measure(deviations: Array) -> Array:
-        return np.concatenate(
-            [shape.place(deviations), (deviations @ shape.inverses[1].T)[..., present]], axis=-1
-        )
+    def measure(vectors: Array) -> Array:
+        flat = vectors[..., :size].reshape(*vectors.shape[:-2], -1)
+        parts = [shape.place(flat), (flat @ shape.inverses[1].T)[..., present]]
+        return np.concatenate([*parts, *[vectors[..., 3]] * has_diameters], axis=-1)
 
-    def flat(vectors: Array) -> Array:
-        return vectors[..., :size].reshape(*vectors.shape[:-2], count * size)
-
-    measured = measure(align(report)[0].ravel() * UM_PER_MM)
-    predicted = measure(flat(holes.error_um))
-    u_um = report.u_um if u95_um is None or report.u_um is not None else np.full(count, u95_um / 2)
     names = [(name, letter, "µm") for name in report.names for letter in "xyz"[:size]]
     names += [("part", shape.names[at], shape.units[at]) for at in present]
-    response = None if holes.response is None else measure(flat(holes.response))
-    own = measure(shape.columns[1].T)
-    variances = None
-    if u_um is not None:
-        each = np.repeat(u_um**2, size)
-        whole = (shape.inverses[1] ** 2 @ each)[present]
-        variances = np.concatenate([shape.placed_variance(each), whole])
-    if holes.diameter_um is not None and report.diameter_mm is not None:
-        names += [(name, "diameter", "µm") for name in report.names]
-        measured = np.append(measured, report.diameter_mm[:, 1] * UM_PER_MM)
-        predicted = np.append(predicted, holes.diameter_um)
-        own = np.pad(own, ((0, 0), (0, count)))
-        if response is not None and holes.response is not None:
-            response = np.hstack([response, holes.response[..., 3]])
-        variances = None if variances is None or u_um is None else np.append(variances, u_um**2)
-    u95_predicted = None
-    if response is not None and holes.errors is not None and holes.errors.is_known:
+    names += [(name, "diameter", "µm") for name in report.names] * has_diameters
+    predicted = measure(holes.deviation_um)
+    measured, u95_predicted, u95_measured, en = np.full((4, len(predicted)), np.nan)
+    if holes.response is not None and holes.errors is not None and holes.errors.is_known:
+        response = measure(holes.response)
         expanded = np.einsum("km,kl,lm->m", response, holes.errors.expanded, response)
-        between = np.sum((2.0 * session_u * own) ** 2, axis=0)
+        variation = measure(_four(shape.columns[1].T.reshape(-1, count, size)))
+        between = np.sum((2.0 * session_u * variation) ** 2, axis=0)
         u95_predicted = np.sqrt(np.maximum(expanded, 0.0) + between)
-    u95_measured = None if variances is None else 2.0 * np.sqrt(np.maximum(variances, 0.0))
-    has_values = report.deviation_mm is not None
-    measurands: list[Measurand] = []
-    for at, name in enumerate(names):
-        value = float(measured[at]) if has_values else None
-        u_predicted, u_measured = (
-            None if u95 is None else float(u95[at]) for u95 in (u95_predicted, u95_measured)
-        )
-        en = None
-        if value is not None and u_predicted is not None and u_measured:
-            en = (value - float(predicted[at])) / float(np.hypot(u_predicted, u_measured))
-        row = float(predicted[at]), u_predicted, value, u_measured if has_values else None, en
-        measurands.append(Measurand(*name, *row))
-    return measurands
+    if report.deviation_mm is not None:
+        read_um = _four(align(report)[0]) * UM_PER_MM
+        if report.diameter_mm is not None:
+            read_um[:, 3] = report.diameter_mm[:, 1] * UM_PER_MM
+        measured = measure(read_um)
+        u_um = np.full(count, np.nan if u95_um is None else u95_um / 2.0)
+        each = np.repeat((u_um if report.u_um is None else report.u_um) ** 2, size)
+        variances = [shape.placed_variance(each), (shape.inverses[1] ** 2 @ each)[present]]
+        variances += [each[::size]] * has_diameters
+        u95_measured = 2.0 * np.sqrt(np.maximum(np.concatenate(variances), 0.0))
+    u95 = np.hypot(u95_predicted, u95_measured)
+    np.divide(measured - predicted, u95, out=en, where=u95 > 0.0)
+    numbers = np.stack([predicted, u95_predicted, measured, u95_measured, en], axis=1).tolist()
+    return [
+        Measurand(*name, row[0], *(None if np.isnan(number) else number for number in row[1:]))
+        for name, row in zip(names, numbers, strict=True)
+    ]
 
 
 @dataclass(frozen=True)
@@ -216,17 +201,12 @@ def seal_prediction(
         return None if value is None else round(value, DIGITS) + 0.0
 
     rows = [
-        [
-            f"{row.name} {row.measure}",
-            row.unit,
-            *map(rounded, (row.predicted_um, row.u95_predicted_um)),
-        ]
+        [f"{row.name} {row.measure}", row.unit, rounded(row.predicted_um),
+         rounded(row.u95_predicted_um)]
         for row in measurands
-    ]
-    document: dict[str, Any] = {
-        "scene": scene.title, "place": [rounded(value) for value in place],
-        "columns": SEALED, "predicted": rows,
-    }  # fmt: skip
+    ]  # fmt: skip
+    stated = {"scene": scene.title, "place": [rounded(value) for value in place]}
+    document: dict[str, Any] = {**stated, "columns": SEALED, "predicted": rows}
     if not Path(path).exists():
         sha256 = _hash(document)
         content = json.dumps(document | {"sha256": sha256}, indent=1, ensure_ascii=False)
@@ -234,45 +214,27 @@ def seal_prediction(
     try:
         sealed = json.loads(read_text(Path(path), MAX_SCENE_BYTES))
         sha256 = str(sealed.pop("sha256"))
-        lines = [(str(name), unit, *numbers) for name, unit, *numbers in sealed["predicted"]]
+        lines = [[name, unit, value, u95] for name, unit, value, u95 in sealed["predicted"]]
     except (ValueError, TypeError, LookupError, AttributeError, RecursionError):
         raise SceneError(path, ["is no sealed prediction; expected another name"]) from None
     if _hash(sealed) != sha256:
         problem = "its content does not have the SHA-256 that it states: it was altered"
         return Seal(path, "altered", sha256, (problem,))
     problems = [
-        f"{key}: {sealed.get(key)} is sealed, now {document[key]}"
-        for key in ("scene", "place")
-        if sealed.get(key) != document[key]
+        f"{key}: {sealed.get(key)} is sealed, now {value}"
+        for key, value in stated.items()
+        if sealed.get(key) != value
     ]
-    differing = [
-        (old, new) for old, new in zip(lines, rows, strict=False) if not _is_equal(old, new)
-    ]
+    differing = [(old, new) for old, new in zip(lines, rows, strict=False) if old != new]
     if differing or len(lines) != len(rows):
         count = len(differing) + abs(len(lines) - len(rows))
-        first = ""
-        if differing:
-            old, new = differing[0]
-            first = f"; first {old[0]}: {old[2]} is sealed, now {new[0]}: {new[2]}"
-        problems.append(f"{count} of {len(lines)} predictions differ{first}")
+        first = [f"; first {old[0]}: {old[2]} is sealed, now {new[2]}" for old, new in differing]
+        problems.append(f"{count} of {len(lines)} predictions differ{first[0] if first else ''}")
     return Seal(path, "different" if problems else "verified", sha256, tuple(problems))
 
 
-def _is_equal(old: Sequence[Any], new: Sequence[Any]) -> bool:
-    tolerance = 2.0 * 10.0**-DIGITS
-    return all(
-        before == after
-        or (
-            isinstance(before, float)
-            and isinstance(after, float)
-            and abs(before - after) <= tolerance
-        )
-        for before, after in zip(old, new, strict=False)
-    )
-
-
 @dataclass(frozen=True, kw_only=True)
-class Comparison(Result):
+class ReportComparison(Result):
     """A report beside its prediction."""
 
     report: InspectionReport

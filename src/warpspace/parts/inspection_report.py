@@ -111,7 +111,7 @@ def parse_report(
         expected = "expected headings such as Nom X, Nom Y, Meas X, Meas Y, and a row for each hole"
         raise SceneError(source, [f"has no coordinates X and Y; {expected}"])
     number, mark, headings = header
-    table = _Table(source, number, mark, headings)
+    table = _ReportColumns(source, number, mark, headings)
     table.read_rows(lines)
     unit, unit_notes = table.find_unit(lines[: number - 1])
     measured = {quantity for role, quantity in table.values if role in ("measured", "deviation")}
@@ -175,7 +175,7 @@ def _recognise(heading: str) -> Column | None:
 
 
 @dataclass
-class _Table:
+class _ReportColumns:
     """Columns of a report by their role and quantity."""
 
     source: str

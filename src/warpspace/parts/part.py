@@ -26,8 +26,8 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_SCENE_BYTES
 from warpspace.parts.inspection import SCAN_NOISE_UM, FeatureResult, features_table, inspect
 from warpspace.parts.inspection_comparison import (
-    Comparison,
     PredictedHoles,
+    ReportComparison,
     compare_report,
     predict_features,
     predict_points,
@@ -125,22 +125,25 @@ class Part(WorkpieceAnalysis):
     tolerances: tuple[str, str] | None = None  # name and text, instead of `features`
     report: InspectionReport | None = None  # instead of `measured`
 
+    @property
+    def is_file_report(self) -> bool:
+        return bool(self.file) and Path(self.file or "").suffix.lower() in REPORT_ENDINGS
+
     def load_report(self) -> InspectionReport | None:
         """Read the inspection report; with a seal it may be the nominal one."""
-        is_mesh = not self.file or Path(self.file).suffix.lower() not in REPORT_ENDINGS
-        name = self.measured or (None if is_mesh else self.file)
-        if self.report is not None or name is None:
-            if self.seal and self.report is None:
-                raise OptionError("{seal} without a report; expected {measured} FILE, or nominal")
-            return self.report
-        return load_report(name, nominal_only=self.seal is not None)
+        name = self.measured or (self.file if self.is_file_report else None)
+        if self.report is None and name:
+            return load_report(name, nominal_only=self.seal is not None)
+        if self.report is None and self.seal:
+            raise OptionError("{seal} without a report; expected {measured} FILE, or a nominal one")
+        return self.report
 
     def compare(
         self, report: InspectionReport, holes: PredictedHoles, scene: Scene, place: Sequence[float]
-    ) -> Comparison:
+    ) -> ReportComparison:
         measurands = compare_report(report, holes, self.u95_um, self.session_u)
         seal = seal_prediction(self.seal, scene, place, measurands) if self.seal else None
-        return Comparison(
+        return ReportComparison(
             report=report,
             measured=measurands,
             scene=scene,
@@ -150,10 +153,10 @@ class Part(WorkpieceAnalysis):
             uncertainty=holes.errors,
         )
 
-    def run(self, scene: Scene, watch: ProgressCallback, /) -> "PartResult | Comparison":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "PartResult | ReportComparison":
         report = self.load_report()
-        is_report = self.file and Path(self.file).suffix.lower() in REPORT_ENDINGS
-        if report and (is_report or not (self.mesh or self.file or scene.part.path("file"))):
+        has_mesh = self.mesh or self.file or scene.part.path("file")
+        if report and (self.is_file_report or not has_mesh):
             watch(0.1)
             holes, placed, actual = predict_points(report, scene, self.place)
             compared = self.compare(report, holes, scene, placed.place)
@@ -264,7 +267,7 @@ class PartResult(PartDeviation, Result):
     scene: Scene
     analysis: Part
     interpolation_um: float  # largest interpolation error; 0 below REPORTED_UM
-    comparison: Comparison | None = None  # with an inspection report
+    comparison: ReportComparison | None = None  # with an inspection report
 
     def json_fields(self) -> dict[str, Any]:
         compared = self.comparison.json_fields() if self.comparison else {}

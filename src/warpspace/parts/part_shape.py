@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,11 +62,11 @@ class PartShape:
     def inverses(self) -> tuple[Array, Array]:
         """Least squares of the placement alone, [p, n·d], and of the shape with it, [s, n·d]."""
         placement, _ = self.columns
-        both = np.hstack(self.columns)
-        scale = np.maximum(np.linalg.norm(both, axis=0), 1e-12)
-        inverse: Array = np.linalg.pinv(both / scale, rcond=RANK_TOLERANCE) / scale[:, None]
-        alone: Array = np.linalg.pinv(placement, rcond=1e-12)
-        return alone, inverse[placement.shape[1] :]
+        columns = np.hstack(self.columns)
+        scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
+        inverse: Any = np.linalg.pinv(columns / scale, rcond=RANK_TOLERANCE) / scale[:, None]
+        placing: Any = np.linalg.pinv(placement, rcond=1e-12)
+        return placing, inverse[placement.shape[1] :]
 
     @cached_property
     def is_estimable(self) -> NDArray[np.bool_]:
@@ -99,8 +100,8 @@ def align(report: InspectionReport) -> tuple[Array, Array]:
     nominal = nominal @ flat
     middle, moved = nominal.mean(axis=0), (nominal + deviation).mean(axis=0)
     arms, measured = nominal - middle, nominal + deviation - moved
-    left, _, right = np.linalg.svd(measured.T @ arms)
-    turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    first, _, second = np.linalg.svd(measured.T @ arms)
+    turn = first @ np.diag([1.0, 1.0, np.linalg.det(first @ second)]) @ second
     if np.linalg.norm(turn - np.eye(3)) > np.sqrt(2.0) * LARGE_TURN_RAD:
         placement[:3, :3], placement[:3, 3] = turn, moved - turn @ middle
         deviation = measured @ turn - arms

@@ -357,8 +357,8 @@ class PartPanel(SceneOverlayPanel):
 
     def _set_file(self, uploaded: UploadedFile) -> None:
         kind = type(uploaded.content)  # tolerances and a report are used together
-        others = (file for file in self.files if not isinstance(file.content, kind))
-        self.set_files((*others, uploaded))
+        different = (file for file in self.files if not isinstance(file.content, kind))
+        self.set_files((*different, uploaded))
 
     def _show_report(self, name: str, report: InspectionReport) -> None:
         self._set_file(UploadedFile(name, report, f"{len(report.names)} holes"))
