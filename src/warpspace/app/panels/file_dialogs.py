@@ -21,7 +21,7 @@ from warpspace.app.panels.panel import Context, Dialog, Job, Jobs, on, setting
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
-from warpspace.parts.inspection_report import is_report
+from warpspace.parts.inspection_report import REPORT_ENDINGS, is_report
 from warpspace.scene.notes import story
 from warpspace.scene.text_files import decode_text
 
@@ -40,7 +40,7 @@ def accepted_endings() -> str:
     """List the extensions of files that the page opens."""
     scene_endings = (".toml", ".urdf", *(end for ends in transfers.IN_BOX.values() for end in ends))
     file_formats = (end for file_format in formats() for end in file_format.endings)
-    endings = dict.fromkeys((*scene_endings, *file_formats))
+    endings = dict.fromkeys((*scene_endings, *file_formats, *REPORT_ENDINGS))
     return ",".join((*endings, *(end.upper() for end in endings if end in (".com", ".cma"))))
 
 

@@ -36,7 +36,7 @@ from warpspace.formats.to_scene import ImportedScene, build_imported_scene
 from warpspace.kinematics import transforms
 from warpspace.machine.axes import is_linear, parameter
 from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
-from warpspace.parts.inspection_report import InspectionReport, parse_report
+from warpspace.parts.inspection_report import REPORT_ENDINGS, InspectionReport, parse_report
 from warpspace.parts.part import PartResult
 from warpspace.parts.workpiece import load_workpiece, place_workpiece
 from warpspace.scene.model import Scene
@@ -257,6 +257,7 @@ class SceneOverlayPanel(FilesPanel):
 
     runs_on_open = True
     most_bytes, what = MAX_UPLOAD_BYTES, "mesh or program"
+    endings: tuple[str, ...] = ()  # of its files, where not those of `IN_BOX`
     part_fields = ("", "")  # fields of `PartLook`: content and name of the file
 
     def about(self, state: AppState) -> Markup:
@@ -275,8 +276,9 @@ class SceneOverlayPanel(FilesPanel):
     def before_result(self, state: AppState) -> Markup:
         content, name = (getattr(state.part, field) for field in self.part_fields)
         about = EMPTY if content is None else self.about(state)
+        endings = ",".join(self.endings or IN_BOX[self.name])
         return HTML.overlay(self.name, self.title, content, name, about, self.files_html(),
-                            self.most_bytes, ",".join(IN_BOX[self.name]))  # fmt: skip
+                            self.most_bytes, endings)  # fmt: skip
 
     def show(self, content: object, name: str, **changes: Any) -> None:
         def update(state: AppState) -> AppState:
@@ -301,21 +303,30 @@ class PartPanel(SceneOverlayPanel):
     """A workpiece: its placement, and an inspection of it as machined."""
 
     part_fields = ("mesh", "name")
-    unsupported = ("place", "predistorted", "seal")
+    unsupported = ("predistorted", "seal")
+    endings = (*IN_BOX["part"], *REPORT_ENDINGS)
     _sent: tuple[str, bytes] | None = None  # read again with another unit
 
     def inputs(self, state: AppState) -> Mapping[str, Any]:
         (scene_part, _), part = PartLook.of_scene(state.scene), state.part
         features = state.scene.part.path("features") if part.mesh is scene_part.mesh else None
-        reports = [file.content for file in self.files if not isinstance(file.content, str)]
-        texts = [(file.name, file.content) for file in self.files if file.content not in reports]
-        files = {"features": features, "tolerances": next(iter(texts), None)}
-        files["report"] = next(iter(reports), None)
-        return {"place": part.place, "mesh": part.mesh, **files}
+        texts = [(file.name, file.content) for file in self.files if isinstance(file.content, str)]
+        files: dict[str, Any] = {"features": features, "tolerances": next(iter(texts), None)}
+        files["report"] = next(iter(self.reports), None)
+        return files if part.mesh is None else {"place": part.place, "mesh": part.mesh, **files}
+
+    @property
+    def reports(self) -> list[InspectionReport]:
+        contents = (file.content for file in self.files)
+        return [content for content in contents if isinstance(content, InspectionReport)]
+
+    def shown_options(self, state: AppState) -> Sequence[Option]:
+        """List the options; a mesh is placed in the drawing, a report alone by its option."""
+        is_placed = state.part.mesh is not None or not self.reports
+        return [option for option in self.options() if option.name != "place" or not is_placed]
 
     def is_ready(self, state: AppState) -> bool:
-        reports = (file for file in self.files if not isinstance(file.content, str))
-        return super().is_ready(state) or any(reports)
+        return super().is_ready(state) or bool(self.reports)
 
     def about(self, state: AppState) -> Markup:
         return HTML.part(partial(setting, state), MAX_SCENE_BYTES)
