@@ -198,6 +198,25 @@ def test_space_has_six_numbers():
     assert readings.part.shape.keys[3] == "squareness_xy_urad"
 
 
+def test_parts_without_noise_and_variation_are_certain():
+    holes = layout(20)
+    text = report_text(holes, holes)
+    sets = [parse_readings(text, f"{at}.txt", BASE, "part") for at in range(3)]
+    document = calibrate(BASE, sets).as_json()
+    assert document["between_parts"]["standard_uncertainty"] == pytest.approx(0.0, abs=1e-3)
+    assert document["shape"][2]["next_part_95"] == pytest.approx([0.0, 0.0], abs=1e-2)
+
+
+def test_reports_in_the_plane_and_in_space_are_refused_together():
+    head, space = "Nom X;Nom Y;Nom Z;Dev X;Dev Y;Dev Z\n", [*np.ndindex(2, 2, 2)]
+    rows = "".join(f"{100 * x};{100 * y};{100 * z};0;0;0\n" for x, y, z in space)
+    flat = parse_readings(report_text(layout(20), layout(20)), "flat.txt", BASE, "part")
+    cube = parse_readings(head + rows, "cube.csv", BASE, "part")
+    for sets, predict in ([flat, cube], []), ([flat], [cube]):
+        with pytest.raises(OptionError, match="with and without Z"):
+            calibrate(BASE, sets, None, predict)
+
+
 @pytest.mark.nightly
 @pytest.mark.skipif(not PLATES.is_dir(), reason="needs the measured plates")
 @pytest.mark.parametrize(

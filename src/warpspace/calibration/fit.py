@@ -11,7 +11,7 @@ from warpspace.calibration import solve
 from warpspace.calibration.calibration_result import Residuals
 from warpspace.calibration.instruments import NO_INSTRUMENT, Instrument, common_mode, effective_dof
 from warpspace.calibration.kinds import in_other_frame
-from warpspace.calibration.part_reports import SessionTerms, couple_parts
+from warpspace.calibration.part_reports import SessionTerms, check_dimensions, couple_parts
 from warpspace.calibration.readings import Readings
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import build_basis
@@ -404,6 +404,7 @@ def predict_readings(
         return (), None, ()
     if fit.options.instrument.scatter[0]:
         sets, _ = with_scatter(fit.scene, sets, fit.options, fit.model.check_cancelled)
+    check_dimensions([*fit.model.sets, *sets])
     model = solve.MeasurementModel.of(fit.scene, sets, fit.model.check_cancelled)
     before = dict(zip(fit.model.unknowns, fit.initial.unknown, strict=True))
     after = dict(zip(fit.model.unknowns, fit.solved.unknown, strict=True))

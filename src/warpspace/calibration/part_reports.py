@@ -125,8 +125,7 @@ def couple_parts(sets: Sequence[Readings]) -> tuple[Readings, ...]:
         f"{name} ({number})" if names.count(name) > 1 else name
         for number, name in enumerate(names, 1)
     ]
-    if len({_part(sets[at]).shape.size for at in indices}) > 1:
-        raise OptionError("{data}: reports with and without Z; expected the same coordinates")
+    check_dimensions(sets)
     coupled = list(sets)
     for at, label in zip(indices, labels, strict=True):
         negative = tuple((other, -1.0) for other in labels[:-1])
@@ -135,6 +134,11 @@ def couple_parts(sets: Sequence[Readings]) -> tuple[Readings, ...]:
         part = replace(_part(readings), terms=terms)
         coupled[at] = replace(readings, part=part, session=(label,) * len(readings))
     return tuple(coupled)
+
+
+def check_dimensions(sets: Sequence[Readings]) -> None:
+    if len({readings.part.shape.size for readings in sets if readings.part}) > 1:
+        raise OptionError("{data}: reports with and without Z; expected the same coordinates")
 
 
 @dataclass(frozen=True)
@@ -174,7 +178,7 @@ class SessionTerms:
             return cls(labels, table, stated, np.inf, "stated")
         if not free:
             return cls(labels, table, None, np.inf, "unknown")
-        total = max(float(values @ values), scatter * (1.0 + 1e-6))
+        total = max(float(values @ values), scatter * (1.0 + 1e-6), 1e-18)
         variance, dof = (total - scatter) / free, free * (1.0 - scatter / total) ** 2
         return cls(labels, table, float(np.sqrt(variance)), dof, "estimated")
 
@@ -218,15 +222,14 @@ class SessionTerms:
 
         parts = [readings for readings in fit.model.sets if readings.part]
         inverses = [_part(readings).shape.inverses[1] for readings in parts]
-        pairs = list(zip(inverses, parts, strict=True))
-        shapes = [UM_PER_MM * inverse @ readings.observed_mm.ravel() for inverse, readings in pairs]
-        scatter = np.mean([
-            np.sum((UM_PER_MM * inverse) ** 2, axis=1)
-            * np.mean((fit.sigma_mm if readings.sigma_mm is None else readings.sigma_mm) ** 2)
-            for inverse, readings in pairs
-        ], axis=0)  # fmt: skip
+        shapes, scatters = list[Array](), list[Array]()
+        for inverse, readings in zip(inverses, parts, strict=True):
+            sigma_mm = fit.sigma_mm if readings.sigma_mm is None else readings.sigma_mm
+            shapes.append(UM_PER_MM * inverse @ readings.observed_mm.ravel())
+            scatters.append(np.sum((UM_PER_MM * inverse) ** 2, axis=1) * np.mean(sigma_mm**2))
+        means, scatter = np.mean(shapes, axis=0), np.mean(scatters, axis=0)
         count, variance = len(parts), np.full_like(scatter, (self.u or 0.0) ** 2)
-        means, shape = np.mean(shapes, axis=0), _part(parts[0]).shape
+        shape = _part(parts[0]).shape
         halves: list[Array] = []
         for factor in (1.0 / count, 1.0 + 1.0 / count):
             terms = np.array([scatter, variance]) * factor
