@@ -21,6 +21,15 @@ def assets_dir() -> Path:
     return _data_root() / "assets"
 
 
+def find_data(name: str) -> Path:
+    """Find a file of readings: a path, or the name of a bundled one such as ``tcp_on.csv``."""
+    path = Path(name)
+    if path.exists() or path.name != name:
+        return path
+    bundled = sorted((assets_dir() / "measurements").glob(f"*/{name}"))
+    return bundled[0] if bundled else path
+
+
 def check_address_space(least_mb: int, what: str) -> None:
     """Refuse work where libraries would abort for want of address space (``ulimit -v``)."""
     try:

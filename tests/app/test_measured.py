@@ -22,8 +22,8 @@ from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put
 from warpspace.bench.base import bench_names
 from warpspace.calibration.calibrate import Calibrate
-from warpspace.calibration.readings import find_data
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
+from warpspace.resources import find_data
 from warpspace.scene.library import load_scene
 
 STATE = start_state(load_scene("dvf5000_first"), nodes=5)

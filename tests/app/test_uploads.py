@@ -9,7 +9,7 @@ from app.wire import opened
 from warpspace.app.browser import actions as do
 from warpspace.app.panels import upload_panels
 from warpspace.exceptions import OptionError
-from warpspace.resources import scenes_dir
+from warpspace.resources import assets_dir, scenes_dir
 from warpspace.scene.library import load_scene
 
 STL = (scenes_dir() / "parts" / "contour.stl").read_bytes()
@@ -70,3 +70,18 @@ def test_a_file_that_is_parsed_when_its_tab_closes_is_not_taken_in(held):
         assert job.is_set()
         go_on.set()
     assert session.state.part.mesh is None
+
+
+def test_a_dropped_inspection_report_opens_the_part_with_the_comparison():
+    """It is recognised by its content; without a mesh its holes are the part."""
+    content = (assets_dir() / "measurements" / "simulated_plates" / "plate_1.txt").read_bytes()
+    with opened(load_scene("dvf5000_nominal")) as (wire, session):
+        wire.say(upload("CMM 17.txt", content))
+        assert wire.read_until(lambda: "part squareness" in str(wire.pieces), 60.0)
+        assert session.state.page.task == "measure"
+        assert "CMM_17.txt, 60 holes" in str(wire.pieces) or "CMM 17.txt, 60 holes" in str(
+            wire.pieces
+        )
+        bad = content.replace(b"   2.167", b"   2,167", 1)
+        wire.say(upload("bad.txt", bad))
+        assert wire.read_until(lambda: "expected one decimal sign" in str(wire.pieces), 60.0)

@@ -11,12 +11,12 @@ from warpspace.acceptance_tests.plans import load_plan
 from warpspace.app.documents.transfers import unpack, upload_text
 from warpspace.bench.base import find_test, run_test
 from warpspace.calibration import read_readings
-from warpspace.calibration.readings import bundled_data, find_data
+from warpspace.calibration.readings import bundled_data
 from warpspace.formats.compensation.compensate import Compensate, compensate
 from warpspace.formats.registry import ReadOptions, find_format, formats, open_upload, read_errors
 from warpspace.formats.to_scene import base_scene, build_imported_scene
 from warpspace.parts.program import Program
-from warpspace.resources import assets_dir, scenes_dir
+from warpspace.resources import assets_dir, find_data, scenes_dir
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 
 

@@ -12,12 +12,13 @@ from warpspace.calibration import Calibrate, calibrate, read_readings, solve
 from warpspace.calibration.calibration_result import Estimability
 from warpspace.calibration.kinds import VIEW, in_other_frame
 from warpspace.calibration.next_best import Candidate, candidates, next_best, u95_at
-from warpspace.calibration.readings import find_data, parse_reading_table
+from warpspace.calibration.readings import parse_reading_table
 from warpspace.calibration.registry import parse_readings
 from warpspace.calibration.solve import build_fit_parameters, describe_rank
 from warpspace.calibration.spheres import circles_of
 from warpspace.field.evaluate import evaluate_exact
 from warpspace.machine.errors import Constant, ErrorSet, Ramp
+from warpspace.resources import find_data
 from warpspace.scene.library import load_scene
 
 FORK = load_scene("fork_head_bc")

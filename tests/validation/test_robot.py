@@ -11,11 +11,11 @@ from warpspace import evaluate
 from warpspace.calibration import Calibrate, calibrate, read_readings
 from warpspace.calibration.instruments import load_instrument
 from warpspace.calibration.kinds import Positions, Prediction
-from warpspace.calibration.readings import find_data
 from warpspace.calibration.registry import parse_readings
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.kinematics.chain import branch_pose
 from warpspace.machine.errors import Constant, ErrorSet
+from warpspace.resources import find_data
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.scene_writer import scene_to_toml
 

@@ -93,6 +93,10 @@ class Result(ABC):
         """Return the text of files that the analysis extends, such as logs, by path."""
         return {}
 
+    def named_files(self) -> Mapping[str, str]:
+        """Return the new files that options other than -o name, by path."""
+        return {}
+
     def as_json(self) -> dict[str, Any]:
         """Return the object that ``--json`` prints."""
         extra = {"second_order_um": self.second_order.um} if self.second_order else {}

@@ -36,6 +36,8 @@ from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import pair_kinds, read_readings
 from warpspace.calibration.solve import CheckCancelled, never_cancelled, read_keys, rms_mm
 from warpspace.exceptions import OptionError, SceneError
+from warpspace.parts.inspection_report import MAX_SESSION_U
+from warpspace.parts.workpiece import read_place
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM
 
@@ -79,7 +81,7 @@ class Calibrate(Analysis):
     )
     kinds: Annotated[tuple[str, ...], Grammar("KIND", typed_word, each=True)] = option(
         (),
-        "points, tracker, sphere, sphere-tcp, lengths, or a test with its options such as"
+        "points, tracker, sphere, sphere-tcp, lengths, part, or a test with its options such as"
         " circular:plane=XZ:radius=150 (`warpspace test --list`)."
         " Once for all files, or once for each, --data before --predict",
         flag="--kind",
@@ -119,12 +121,27 @@ class Calibrate(Analysis):
         " Readings without u_um have its scatter; common contributions widen the intervals",
         unset="none",
     )
+    place: Annotated[tuple[float, ...] | None, Grammar("X,Y,Z[,A,B,C]", read_place)] = option(
+        None,
+        "Where parts of inspection reports were clamped, in the workpiece frame, mm and degrees",
+        unset="that of the scene",
+    )
+    session_u: float | None = option(
+        None,
+        "Standard uncertainty of the variation between parts: scales and squareness",
+        unit="µm/m and µrad",
+        low=0.0,
+        high=MAX_SESSION_U,
+        unset="estimated from several inspection reports",
+    )
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> Calibration:
         names = (*self.data, *self.predict)
         kinds = pair_kinds(names, self.kinds)
+        part = replace(scene.part, place=(*self.place, 0.0, 0.0, 0.0)[:6] if self.place else None)
+        placed = replace(scene, part=part) if self.place else scene
         sets = [
-            read_readings(name, scene, kind, self.frame)
+            read_readings(name, placed, kind, self.frame)
             for name, kind in zip(names, kinds, strict=True)
         ]
         if self.frame is not None and not any(readings.frame for readings in sets):
@@ -142,7 +159,7 @@ class Calibrate(Analysis):
 
     @property
     def fit_options(self) -> FitOptions:
-        return FitOptions(self.fit, self.robust, self.priors, self.instrument)
+        return FitOptions(self.fit, self.robust, self.priors, self.instrument, self.session_u)
 
     def _sense_notes(
         self,
@@ -274,7 +291,7 @@ def _report(fit: Fit, predict: Sequence[Readings]) -> Calibration:
     parameters, combinations = _estimates(fit)
     lack_of_fit, lack_notes = fit.lack_of_fit
     predicted, coverage, prediction_notes = predict_readings(fit, predict)
-    budget = None
+    budget, terms = None, fit.session_terms
     if instrument.name:
         map_u95 = u95_at(scene, fit.fitted, "map")
         total = map_u95(fit.covariance) or 1.0  # where no error acts
@@ -307,9 +324,11 @@ def _report(fit: Fit, predict: Sequence[Readings]) -> Calibration:
             *(note for readings in (*model.sets, *predict) for note in readings.notes),
             *prediction_notes,
             *lack_notes,
+            *(terms.notes() if terms else ()),
             *frame_notes(fit),
         ),
         observability=observability(scene, model.sets, model.check_cancelled),
+        sessions=terms.as_json(fit) if terms else {},
     )
 
 

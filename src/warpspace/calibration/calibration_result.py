@@ -219,6 +219,9 @@ class Calibration(Result):
     # observability index of the location and orientation errors of each rotary axis
     observability: Mapping[str, float] = field(default_factory=dict[str, float])
 
+    # of inspection reports: keys of the JSON object (`SessionTerms.as_json`)
+    sessions: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
     @property
     def circles(self) -> list[Circle]:
         """Circles about rotary axes through fitted readings."""
@@ -258,6 +261,7 @@ class Calibration(Result):
             "fitted": [group.as_json() for group in self.fitted],
             "predicted": [group.as_json() for group in self.predicted],
             "notes": list(self.notes),
+            **self.sessions,
         }
 
     def file_table(self) -> Table:
@@ -299,6 +303,7 @@ class Calibration(Result):
             width = f"residuals are {self.sigma_mm:.2f} times the stated uncertainty"
         yield f"  {width}, {self.dof} degrees of freedom"
         yield from budget_blocks(self.instrument) if self.instrument else ()
+        yield from session_blocks(self.sessions) if self.sessions else ()
         if self.observability:
             axes = ", ".join(f"{axis} {index:.2f}" for axis, index in self.observability.items())
             yield (
@@ -407,6 +412,29 @@ class Calibration(Result):
                 yield FittedParameter(row.key, before, total.value, width, interval, row.estimable)
             elif row.interval_95 is not None:
                 yield row
+
+
+def session_blocks(sessions: Mapping[str, Any]) -> Iterator[Block]:
+    """List the shape of the mean part, and the session term of each part."""
+    columns = (
+        Column("shape", leads=True), Column("unit"),
+        *number_columns(("mean part", "from", "to"), "+.1f"),
+        *number_columns(("next from", "to"), "+.1f"),
+    )  # fmt: skip
+    rows = [
+        (row["measure"], row["unit"], row["value"], *row["interval_95"],
+         *(row["next_part_95"] or (None, None)))
+        for row in sessions["shape"]
+    ]  # fmt: skip
+    yield Table(columns, rows, "Shape of the mean part and of the next part, 95 % intervals:")
+    variation = sessions["between_parts"]
+    u, dof = variation["standard_uncertainty"], variation["degrees_of_freedom"]
+    if u is not None:
+        extent = "" if dof is None else f", {dof} degrees of freedom"
+        yield f"  variation between parts ({variation['source']}): u = {u:.1f} µm/m, µrad{extent}"
+    for row in sessions["sessions"] if u is not None else ():
+        numbers = ", ".join(f"{value:+.1f}" for value in row["term"].values())
+        yield f"    {row['file']}: {numbers} from the mean"
 
 
 def _significance(row: FittedParameter) -> float:

@@ -11,6 +11,7 @@ from warpspace.calibration import solve
 from warpspace.calibration.calibration_result import Residuals
 from warpspace.calibration.instruments import NO_INSTRUMENT, Instrument, common_mode, effective_dof
 from warpspace.calibration.kinds import in_other_frame
+from warpspace.calibration.part_reports import SessionTerms, check_dimensions, couple_parts
 from warpspace.calibration.readings import Readings
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import build_basis
@@ -35,6 +36,7 @@ class FitOptions:
     robust: bool = False
     priors: bool = False
     instrument: Instrument = NO_INSTRUMENT
+    session_u: float | None = None  # between parts, µm/m and µrad; None where not stated
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ class Fit:
         options: FitOptions,
         check_cancelled: solve.CheckCancelled = solve.never_cancelled,
     ) -> "Fit":
+        sets = couple_parts(sets)
         has_assumed_scatter = any(readings.sigma_mm is None for readings in sets)
         sets, notes = with_scatter(scene, sets, options, check_cancelled)
         model = solve.MeasurementModel.of(scene, sets, check_cancelled)
@@ -177,20 +180,42 @@ class Fit:
         return self.options.instrument.scatter[1] if self.has_assumed_scatter else np.inf
 
     @cached_property
+    def gain(self) -> Array:
+        """Change of parameters and set-ups per change of each component of readings, [k + m, N]."""
+        weights = np.sqrt(self.solved.trust) * self.weights
+        gain = solve.covariance_of(self.solved) @ self.solved.weighted[: len(weights)].T
+        return -gain * weights
+
+    @cached_property
     def shared_shifts(self) -> list[Array]:
         """Change of parameters and set-ups per u of each shared contribution, [k + m, c] each."""
-        weights = np.sqrt(self.solved.trust) * self.weights[:, None]
-        gain = solve.covariance_of(self.solved) @ self.solved.weighted.T
-        gain = gain[:, : len(weights)]
         shared = self.options.instrument.shared
-        return [-gain @ (weights * common_mode(self.model, row)) for row in shared]
+        return [self.gain @ common_mode(self.model, row) for row in shared]
+
+    @cached_property
+    def session_terms(self) -> SessionTerms | None:
+        """The variation between the parts of inspection reports."""
+        return SessionTerms.of(self)
+
+    @cached_property
+    def session_shift(self) -> Array:
+        """Change of parameters and set-ups per u of the shape of the mean part, [k + m, s]."""
+        if self.session_terms is None:
+            return np.zeros((len(self.scatter_covariance), 0))
+        shift = self.gain @ self.session_terms.columns(self.model.sets)
+        return shift / np.sqrt(len(self.session_terms.labels))
 
     @cached_property
     def covariance_parts(self) -> Array:
-        """Covariance of the parameters by its source, [1 + shared, k, k]: scatter comes first."""
+        """Covariance of the parameters by its source, [2 + shared, k, k].
+
+        The scatter comes first, the variation between parts last.
+        """
         count = len(self.fitted.keys)
-        shared = [shift[:count] @ shift[:count].T for shift in self.shared_shifts]
-        return np.stack([self.scatter_covariance[:count, :count], *shared])
+        shifts = [shift[:count] for shift in (*self.shared_shifts, self.session_shift)]
+        return np.stack(
+            [self.scatter_covariance[:count, :count], *(shift @ shift.T for shift in shifts)]
+        )
 
     @cached_property
     def covariance(self) -> Array:
@@ -201,7 +226,8 @@ class Fit:
         """Effective degrees of freedom of each fitted parameter, [k]."""
         variances = np.diagonal(self.covariance_parts, axis1=1, axis2=2)
         shared = [row.dof for row in self.options.instrument.shared]
-        return effective_dof(variances, [self.scatter_dof, *shared])
+        terms_dof = self.session_terms.dof if self.session_terms else np.inf
+        return effective_dof(variances, [self.scatter_dof, *shared, terms_dof])
 
     @cached_property
     def lack_of_fit(self) -> tuple[float | None, tuple[str, ...]]:
@@ -378,6 +404,7 @@ def predict_readings(
         return (), None, ()
     if fit.options.instrument.scatter[0]:
         sets, _ = with_scatter(fit.scene, sets, fit.options, fit.model.check_cancelled)
+    check_dimensions([*fit.model.sets, *sets])
     model = solve.MeasurementModel.of(fit.scene, sets, fit.model.check_cancelled)
     before = dict(zip(fit.model.unknowns, fit.initial.unknown, strict=True))
     after = dict(zip(fit.model.unknowns, fit.solved.unknown, strict=True))
@@ -430,6 +457,10 @@ def _coverage(
     for contribution, shift in zip(fit.options.instrument.shared, fit.shared_shifts, strict=True):
         added = solve.project_out(weights * common_mode(model, contribution), set_up)
         variance += np.sum((added - jacobian @ shift[columns]) ** 2, axis=1)
+    if fit.session_terms is not None:  # another part varies by itself
+        added = solve.project_out(weights * fit.session_terms.columns(model.sets), set_up)
+        variance += np.sum(added**2, axis=1)
+        variance += np.sum((jacobian @ fit.session_shift[columns]) ** 2, axis=1)
     leverage = np.sum(set_up**2, axis=1)
     half_widths = t.ppf(0.975, fit.scatter_dof) * np.sqrt(variance + 1.0 - leverage)
     deviations = weights[:, 0] * np.concatenate([row.ravel() for row in residuals])

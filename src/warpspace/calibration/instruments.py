@@ -111,7 +111,8 @@ def _levers_mm(model: MeasurementModel, readings: Readings) -> Array:
         return readings.observed_mm - readings.observed_mm.mean(axis=0)
     plan = readings.plan
     if plan is None:
-        return readings.nominal_mm - readings.nominal_mm.mean(axis=0)
+        levers = readings.nominal_mm - readings.nominal_mm.mean(axis=0)
+        return levers @ readings.part.axes.T if readings.part else levers
     tip = relative_point(model.scene.model, plan.coordinates)
     turn = branch_pose(model.scene.model, "workpiece", readings.coordinates)[..., :3, :3]
     origin = np.where((plan.against >= 0)[:, None], tip[plan.against], tip[plan.site].mean(axis=0))

@@ -12,6 +12,7 @@ from warpspace.bench.plan import BenchPlan
 from warpspace.exceptions import OptionError, SceneError, near_miss
 from warpspace.kinematics.relative_motion import relative_point
 from warpspace.machine.axes import is_linear
+from warpspace.parts.part_shape import PartShape
 from warpspace.resources import assets_dir
 from warpspace.scene.model import Scene, coverage_notes
 from warpspace.scene.text_files import (
@@ -169,6 +170,22 @@ class Circle:
 
 
 @dataclass(frozen=True, slots=True)
+class MeasuredPart:
+    """A part and its inspection report."""
+
+    shape: PartShape
+    rotation: Array  # [3, 3], from the frame of the report to that of the workpiece
+    alignment: Array  # [4, 4], removed from the readings: from nominal to measured points
+    # session terms, by report, that its shape is made of, with factors; see `couple_parts`
+    terms: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def axes(self) -> Array:
+        """Directions of its readings, [d, 3], unit vectors in the frame of the workpiece."""
+        return self.rotation.T[: self.shape.size]
+
+
+@dataclass(frozen=True, slots=True)
 class Readings:
     """The readings of one file."""
 
@@ -187,18 +204,10 @@ class Readings:
     plan: BenchPlan | None = None  # of the standard test, along its path
     # start values of the unknowns of the set-up, where a kind fits them on reading
     first_fit: tuple[float, ...] = ()
+    part: MeasuredPart | None = None  # of an inspection report
 
     def __len__(self) -> int:
         return len(self.lines)
-
-
-def find_data(name: str) -> Path:
-    """Find a file of readings: a path, or the name of a bundled one such as ``tcp_on.csv``."""
-    path = Path(name)
-    if path.exists() or path.name != name:
-        return path
-    bundled = sorted((assets_dir() / "measurements").glob(f"*/{name}"))
-    return bundled[0] if bundled else path
 
 
 def bundled_data() -> tuple[str, ...]:

@@ -19,16 +19,18 @@ from warpspace.calibration.kinds import (
     Prediction,
     Tracker,
 )
+from warpspace.calibration.part_reports import PartReports
 from warpspace.calibration.readings import (
     Readings,
     ReadingTable,
     check_spread,
-    find_data,
     parse_reading_table,
 )
 from warpspace.calibration.spheres import SphereKind, SphereTcp
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.machine.limits import MAX_CSV_BYTES, MAX_ERROR
+from warpspace.parts.inspection_report import is_report
+from warpspace.resources import find_data
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import parse_number, read_table_text
 from warpspace.units import MM_PER_UM, Array
@@ -130,7 +132,15 @@ def _value(option: Option, text: str, test: str) -> Any:
 
 KINDS: Mapping[str, MeasurementKind] = {
     kind.name: kind
-    for kind in (Points(), Tracker(), Positions(), SphereKind(), SphereTcp(), Lengths())
+    for kind in (
+        Points(),
+        Tracker(),
+        Positions(),
+        SphereKind(),
+        SphereTcp(),
+        Lengths(),
+        PartReports(),
+    )
 }
 
 
@@ -179,7 +189,8 @@ def read_readings(
 def parse_readings(
     text: str, source: str, scene: Scene, kind: str | None = None, frame: str | None = None
 ) -> Readings:
-    measurement = None if kind is None else find_kind(kind)
+    name = "part" if kind is None and is_report(text) else kind
+    measurement = None if name is None else find_kind(name)
     if measurement is not None and measurement.reads_text:
         return measurement.read(ReadingTable(source, {}, {}, (), text), scene)
     table = replace(parse_reading_table(text, source), frame=frame)

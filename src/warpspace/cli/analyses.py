@@ -167,7 +167,7 @@ def write_result(
     result: "Result", csv_path: str | None, plot: str | None, output: str | None, *, force: bool
 ) -> list[str]:
     """Write all files of a result, or none; return those of -o, the file named first."""
-    files: dict[str | Path, str | bytes] = {}
+    files: dict[str | Path, str | bytes] = {**result.named_files()}
     written_files: list[str] = []
     if output is not None:
         from warpspace.scene.scene_writer import scene_files

@@ -12,7 +12,7 @@ from click.shell_completion import CompletionItem
 
 from warpspace.exceptions import OptionError, OutputError, SceneError
 from warpspace.machine.limits import MAX_SCENE_BYTES
-from warpspace.resources import assets_dir, check_address_space
+from warpspace.resources import assets_dir, check_address_space, find_data
 from warpspace.scene.text_files import parse_number, parse_toml, read_text
 
 LEAST_MB = 800  # address space below which imported libraries abort
@@ -30,8 +30,6 @@ class DataFile(InputFile):
     """A file of readings, or the name of a bundled one."""
 
     def files(self, value: str | Path) -> Iterable[Path]:
-        from warpspace.calibration.readings import find_data
-
         return (find_data(str(value)),)
 
 

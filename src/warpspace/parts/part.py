@@ -8,21 +8,37 @@ from dataclasses import dataclass, replace
 from functools import partial
 from operator import itemgetter
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import ProgressCallback, Result
-from warpspace.analysis.options import File, option
+from warpspace.analysis.options import File, Grammar, option, typed_word
 from warpspace.analysis.statistics import Numbers, Statistics, statistics
 from warpspace.analysis.uncertainty.propagation import FieldUncertainty, plus_minus, u95_lines
 from warpspace.bodies.gltf import to_gltf
 from warpspace.bodies.mesh_files import FORMATS, MM_PER_M, UNITS_MM
+from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField
 from warpspace.kinematics import transforms
 from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_SCENE_BYTES
 from warpspace.parts.inspection import SCAN_NOISE_UM, FeatureResult, features_table, inspect
+from warpspace.parts.inspection_comparison import (
+    PredictedHoles,
+    ReportComparison,
+    compare_report,
+    predict_features,
+    predict_points,
+    seal_prediction,
+)
+from warpspace.parts.inspection_report import (
+    MAX_SESSION_U,
+    REPORT_ENDINGS,
+    InspectionReport,
+    load_report,
+)
 from warpspace.parts.refinement import refine
 from warpspace.parts.workpiece import (
     TRIANGLES_AT_ONCE,
@@ -57,13 +73,16 @@ class Part(WorkpieceAnalysis):
     Rotary axes are at their positions of the scene; linear axes bring the tool to each vertex of
     the clamped part. Errors are those of the tool against the workpiece, in the workpiece frame,
     actual − nominal: as cut, and placed, after the best rigid fit of its surface, as in an
-    inspection. Planes, cylinders, cones and spheres are recognised and measured.
+    inspection. Planes, cylinders, cones and spheres are recognised and measured. An inspection
+    report is compared with the prediction; without a mesh its nominal points are the part.
     Geometry only: no forces, heat, wear or servo.
     """
 
     name = "part"
     task = "measure"
     has_table = True
+    has_chart = True
+    chart_help = "measured and predicted deviations of a report"
     file_help = "Part as cut: .stl, .obj, .ply or .glb."
     file_endings = tuple(FORMATS)
     features: File = option(
@@ -78,9 +97,70 @@ class Part(WorkpieceAnalysis):
         low=0.0,
         high=MAX_NOISE_UM,
     )
+    measured: File = option(
+        None,
+        "Inspection report: nominal and measured coordinates of holes, .txt, .csv or .xlsx",
+        unset="a FILE that is no mesh, else none",
+    )
+    u95_um: float | None = option(
+        None,
+        "Expanded uncertainty of a measured coordinate, if the report states none",
+        unit="µm",
+        low=1e-3,
+        high=MAX_NOISE_UM,
+        unset="unknown",
+    )
+    session_u: float = option(
+        0.0,
+        "Standard uncertainty of the variation between parts: scales and squareness",
+        unit="µm/m and µrad",
+        low=0.0,
+        high=MAX_SESSION_U,
+    )
+    seal: Annotated[str | None, Grammar("FILE", typed_word)] = option(
+        None,
+        "Write the predicted report with a hash; verify an existing one",
+        unset="none",
+    )
     tolerances: tuple[str, str] | None = None  # name and text, instead of `features`
+    report: InspectionReport | None = None  # instead of `measured`
 
-    def run(self, scene: Scene, watch: ProgressCallback, /) -> "PartResult":
+    @property
+    def is_file_report(self) -> bool:
+        return bool(self.file) and Path(self.file or "").suffix.lower() in REPORT_ENDINGS
+
+    def load_report(self) -> InspectionReport | None:
+        """Read the inspection report; with a seal it may be the nominal one."""
+        name = self.measured or (self.file if self.is_file_report else None)
+        if self.report is None and name:
+            return load_report(name, nominal_only=self.seal is not None)
+        if self.report is None and self.seal:
+            raise OptionError("{seal} without a report; expected {measured} FILE, or a nominal one")
+        return self.report
+
+    def compare(
+        self, report: InspectionReport, holes: PredictedHoles, scene: Scene, place: Sequence[float]
+    ) -> ReportComparison:
+        measurands = compare_report(report, holes, self.u95_um, self.session_u)
+        seal = seal_prediction(self.seal, scene, place, measurands) if self.seal else None
+        return ReportComparison(
+            report=report,
+            measured=measurands,
+            scene=scene,
+            place=place,
+            seal=seal,
+            second_order=second_order(scene, Loop.RELATIVE),
+            uncertainty=holes.errors,
+        )
+
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "PartResult | ReportComparison":
+        report = self.load_report()
+        has_mesh = self.mesh or self.file or scene.part.path("file")
+        if report and (self.is_file_report or not has_mesh):
+            watch(0.1)
+            holes, placed, actual = predict_points(report, scene, self.place)
+            compared = self.compare(report, holes, scene, placed.place)
+            return replace(compared, outside=int(actual.outside.sum()))
         mesh = self.load_mesh(scene)
         of_scene = not (self.mesh or self.file)
         features = self.features or (scene.part.path("features") if of_scene else None)
@@ -105,7 +185,13 @@ class Part(WorkpieceAnalysis):
             features_of = inspect(
                 scene, fine, actual, tolerances, uncertainty, interpolation, self.noise
             )
+        comparison = None
+        if report:
+            about = fine, surface, actual, uncertainty, self.noise
+            holes = predict_features(report, *about)
+            comparison = self.compare(report, holes, scene, surface.place)
         return PartResult(
+            comparison=comparison,
             vertices=vertices,
             outside=int(actual.outside[:vertices].sum()),
             **vars(as_cut),
@@ -181,9 +267,18 @@ class PartResult(PartDeviation, Result):
     scene: Scene
     analysis: Part
     interpolation_um: float  # largest interpolation error; 0 below REPORTED_UM
+    comparison: ReportComparison | None = None  # with an inspection report
+
+    def json_fields(self) -> dict[str, Any]:
+        compared = self.comparison.json_fields() if self.comparison else {}
+        return super().json_fields() | compared
+
+    def named_files(self) -> Mapping[str, str]:
+        return self.comparison.named_files() if self.comparison else {}
 
     def caveats(self) -> Iterator[str]:
         yield from self.workpiece.warnings
+        yield from self.comparison.report_caveats() if self.comparison else ()
         if self.outside:
             far = f"{self.outside:,} of {self.vertices:,} vertices"
             yield f"{far} are beyond the travel; their errors are continued"
@@ -224,6 +319,7 @@ class PartResult(PartDeviation, Result):
         for name, state in states.items() if self.uncertainty else ():
             low, high = (plus_minus(state.normal[f"u95_{end}"]) for end in ends)
             yield f"  U95 along the normal, {name}: min {low}, max {high} µm"
+        yield from self.comparison.comparison_blocks() if self.comparison else ()
         yield features_table(self.features)
 
     def output_files(self, ending: str = ".stl", /) -> Mapping[str, bytes | str]:

@@ -54,7 +54,11 @@ NEEDED = {
     "conformance": ("dvf5000_first", {"limit_um": 40.0}, ["--limit", "40"]),
     "calibrate": ("fork_head_bc", {"data": ("tcp_on.csv",)}, ["--data", "tcp_on.csv"]),
     "clamp": ("dvf5000_first", {"file": PLATE, "place": (0, 0, 50)}, [PLATE, "--place", "0,0,50"]),
-    "part": ("dvf5000_first", {"file": PLATE}, [PLATE]),
+    "part": (
+        "dvf5000_first",
+        {"measured": "plate_1.txt", "u95_um": 6.0},
+        ["--measured", "plate_1.txt", "--u95", "6"],
+    ),
     "program": ("dvf5000_first", {"file": CONTOUR, "length_mm": 80.0}, [CONTOUR, "--length", "80"]),
 }
 """Scene, options and what is typed, of analyses that answer nothing without."""
@@ -86,7 +90,13 @@ def test_the_list_says_what_the_analysis_says(entry):
 def test_every_option_has_help_and_a_range_it_keeps(entry):
     kind = entry.load()
     others = {one.name for one in fields(kind)} - {one.name for one in options_of(kind)}
-    assert others <= {"stem", "mesh", "tolerances", "text"}  # names and what is read already
+    assert others <= {
+        "stem",
+        "mesh",
+        "tolerances",
+        "text",
+        "report",
+    }  # names and what is read already
     for one in options_of(kind):
         assert one.about.rstrip(".") == one.about != "", one.name
         assert one.flag.startswith("--")

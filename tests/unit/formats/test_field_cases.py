@@ -1,8 +1,6 @@
 """Files as they are found in the shop, after public bug reports and manuals, with their numbers."""
 
-import io
 import re
-import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +21,7 @@ from warpspace.machine.errors import ErrorSet
 from warpspace.scene.curve_reader import read_csv_runs
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.text_files import match_column
+from workbooks import xlsx
 
 
 def imported_scene(text, name, base=None):
@@ -710,41 +709,6 @@ def test_robot_readings_without_positions_or_joints_are_refused(header, message)
     row = ",".join("1" for _ in header.split(","))
     with pytest.raises(SceneError, match=message):
         parse_readings(f"{header}\n{row}\n", "r.csv", load_scene("ur10"), "positions")
-
-
-def xlsx(rows):
-    """Build the smallest workbook with one sheet."""
-    cells = "".join(
-        "<row>" + "".join(
-            f"<c><v>{cell}</v></c>" if isinstance(cell, float)
-            else f'<c t="inlineStr"><is><t>{cell}</t></is></c>'
-            for cell in row
-        ) + "</row>"
-        for row in rows
-    )  # fmt: skip
-    head = '<?xml version="1.0" encoding="UTF-8"?>'
-    main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
-    relations = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
-    package = "http://schemas.openxmlformats.org/package/2006"
-    parts = {
-        "[Content_Types].xml": f'<Types xmlns="{package}/content-types"><Default Extension="xml"'
-        ' ContentType="application/xml"/><Default Extension="rels" ContentType="application/vnd.'
-        'openxmlformats-package.relationships+xml"/></Types>',
-        "_rels/.rels": f'<Relationships xmlns="{package}/relationships"><Relationship Id="r1"'
-        f' Type="{relations}/officeDocument" Target="xl/workbook.xml"/></Relationships>',
-        "xl/workbook.xml": f'<workbook xmlns="{main}" xmlns:r="{relations}"><sheets><sheet'
-        ' name="Laser" sheetId="1" r:id="r1"/></sheets></workbook>',
-        "xl/_rels/workbook.xml.rels": f'<Relationships xmlns="{package}/relationships">'
-        f'<Relationship Id="r1" Type="{relations}/worksheet" Target="worksheets/sheet1.xml"/>'
-        "</Relationships>",
-        "xl/worksheets/sheet1.xml": f'<worksheet xmlns="{main}"><sheetData>{cells}</sheetData>'
-        "</worksheet>",
-    }
-    content = io.BytesIO()
-    with zipfile.ZipFile(content, "w") as archive:
-        for name, text in parts.items():
-            archive.writestr(name, head + text)
-    return content.getvalue()
 
 
 def test_a_table_of_fanuc_with_a_decimal_comma_is_refused():

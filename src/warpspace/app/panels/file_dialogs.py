@@ -21,7 +21,9 @@ from warpspace.app.panels.panel import Context, Dialog, Job, Jobs, on, setting
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
+from warpspace.parts.inspection_report import REPORT_ENDINGS, is_report
 from warpspace.scene.notes import story
+from warpspace.scene.text_files import decode_text
 
 HTML = Templates("dialogs")
 RENDER_TIMEOUT_S = 30.0
@@ -38,7 +40,7 @@ def accepted_endings() -> str:
     """List the extensions of files that the page opens."""
     scene_endings = (".toml", ".urdf", *(end for ends in transfers.IN_BOX.values() for end in ends))
     file_formats = (end for file_format in formats() for end in file_format.endings)
-    endings = dict.fromkeys((*scene_endings, *file_formats))
+    endings = dict.fromkeys((*scene_endings, *file_formats, *REPORT_ENDINGS))
     return ",".join((*endings, *(end.upper() for end in endings if end in (".com", ".cma"))))
 
 
@@ -109,6 +111,8 @@ class FilesDialog(JobDialog):
             text, notes = transfers.robot_text(name, content)
         elif name.lower().endswith(".toml"):
             text = transfers.upload_text(content, name)
+        elif is_report(decode_text(content, name, "replace")[0]):
+            return partial(self.context.send, msgspec.structs.replace(upload, panel="part"))
         else:
             return partial(self.context.offer_import, name, content)
         opened, camera = scene_file.open_text(text, transfers.safe_name(name), name)

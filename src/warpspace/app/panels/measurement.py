@@ -31,9 +31,10 @@ from warpspace.bench.base import BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table as parse_test
 from warpspace.calibration.calibrate import Calibrate
 from warpspace.calibration.calibration_result import Calibration
-from warpspace.calibration.readings import bundled_data, find_data, parse_reading_table
+from warpspace.calibration.readings import bundled_data, parse_reading_table
 from warpspace.calibration.registry import KINDS, parse_readings
 from warpspace.exceptions import OptionError
+from warpspace.resources import find_data
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import decode_text
 from warpspace.units import Array

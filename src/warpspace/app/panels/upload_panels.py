@@ -36,6 +36,8 @@ from warpspace.formats.to_scene import ImportedScene, build_imported_scene
 from warpspace.kinematics import transforms
 from warpspace.machine.axes import is_linear, parameter
 from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
+from warpspace.parts.inspection_report import REPORT_ENDINGS, InspectionReport, parse_report
+from warpspace.parts.part import PartResult
 from warpspace.parts.workpiece import load_workpiece, place_workpiece
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import decode_text
@@ -255,6 +257,7 @@ class SceneOverlayPanel(FilesPanel):
 
     runs_on_open = True
     most_bytes, what = MAX_UPLOAD_BYTES, "mesh or program"
+    endings: tuple[str, ...] = ()  # of its files, where not those of `IN_BOX`
     part_fields = ("", "")  # fields of `PartLook`: content and name of the file
 
     def about(self, state: AppState) -> Markup:
@@ -273,8 +276,9 @@ class SceneOverlayPanel(FilesPanel):
     def before_result(self, state: AppState) -> Markup:
         content, name = (getattr(state.part, field) for field in self.part_fields)
         about = EMPTY if content is None else self.about(state)
+        endings = ",".join(self.endings or IN_BOX[self.name])
         return HTML.overlay(self.name, self.title, content, name, about, self.files_html(),
-                            self.most_bytes, ",".join(IN_BOX[self.name]))  # fmt: skip
+                            self.most_bytes, endings)  # fmt: skip
 
     def show(self, content: object, name: str, **changes: Any) -> None:
         def update(state: AppState) -> AppState:
@@ -299,21 +303,38 @@ class PartPanel(SceneOverlayPanel):
     """A workpiece: its placement, and an inspection of it as machined."""
 
     part_fields = ("mesh", "name")
-    unsupported = ("place", "predistorted")
+    unsupported = ("predistorted", "seal")
+    endings = (*IN_BOX["part"], *REPORT_ENDINGS)
     _sent: tuple[str, bytes] | None = None  # read again with another unit
 
     def inputs(self, state: AppState) -> Mapping[str, Any]:
         (scene_part, _), part = PartLook.of_scene(state.scene), state.part
         features = state.scene.part.path("features") if part.mesh is scene_part.mesh else None
-        tolerances = next(((file.name, file.content) for file in self.files), None)
-        files = {"features": features, "tolerances": tolerances}
-        return {"place": part.place, "mesh": part.mesh, **files}
+        texts = [(file.name, file.content) for file in self.files if isinstance(file.content, str)]
+        files: dict[str, Any] = {"features": features, "tolerances": next(iter(texts), None)}
+        files["report"] = next(iter(self.reports), None)
+        return files if part.mesh is None else {"place": part.place, "mesh": part.mesh, **files}
+
+    @property
+    def reports(self) -> list[InspectionReport]:
+        contents = (file.content for file in self.files)
+        return [content for content in contents if isinstance(content, InspectionReport)]
+
+    def shown_options(self, state: AppState) -> Sequence[Option]:
+        """List the options; a mesh is placed in the drawing, a report alone by its option."""
+        is_placed = state.part.mesh is not None or not self.reports
+        return [option for option in self.options() if option.name != "place" or not is_placed]
+
+    def is_ready(self, state: AppState) -> bool:
+        return super().is_ready(state) or bool(self.reports)
 
     def about(self, state: AppState) -> Markup:
         return HTML.part(partial(setting, state), MAX_SCENE_BYTES)
 
     def result_html(self, result: description.Result) -> Markup:
-        *_, features = (block for block in result.blocks() if isinstance(block, Table))
+        *_, features = result.blocks_of(Table)
+        if not isinstance(result, PartResult):
+            return super().result_html(result)
         verdicts = [(name, verdict) for name, *_, verdict, _ in features.rows if verdict]
         return HTML.verdicts(verdicts) + super().result_html(result)
 
@@ -332,15 +353,27 @@ class PartPanel(SceneOverlayPanel):
         return super().set_option(state, action)
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
-        """Parse tolerances, or a mesh; a mesh of another name is placed at the centre."""
+        """Parse tolerances, a report, or a mesh; a mesh of another name is placed at the centre."""
+        if not name.lower().endswith((".toml", *IN_BOX[self.name])):
+            text, notes = decode_text(content, name)
+            return partial(self._show_report, name, parse_report(text, name, notes))
         if name.lower().endswith(".toml"):
             text = upload_text(content, name, "tolerance file")
-            return partial(self.set_files, (UploadedFile(name, text),))
+            return partial(self._set_file, UploadedFile(name, text))
         self._sent, state = (name, content), self.context.state
         mesh = load_workpiece(name, option_values(state, self.name).get("unit") or None, content)
         present_place = state.part.place if name == state.part.name else None
         place = np.round(place_workpiece(mesh, state.standing, present_place).place, 3)
         return partial(self.show, mesh, name, place=tuple(place.tolist()))
+
+    def _set_file(self, uploaded: UploadedFile) -> None:
+        kind = type(uploaded.content)  # tolerances and a report are used together
+        different = (file for file in self.files if not isinstance(file.content, kind))
+        self.set_files((*different, uploaded))
+
+    def _show_report(self, name: str, report: InspectionReport) -> None:
+        self._set_file(UploadedFile(name, report, f"{len(report.names)} holes"))
+        self.context.post(lambda state: with_section(state, self.task, self.name))
 
 
 class ProgramPanel(SceneOverlayPanel):
