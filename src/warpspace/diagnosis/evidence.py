@@ -9,7 +9,7 @@ the block S of coefficients changes the logarithm of the evidence by
 K = δ⁻¹ − V_SS.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, product
@@ -32,6 +32,7 @@ OUTLIER = 5.0  # standard deviation of an outlier, likewise
 MAX_OUTLIERS = 3  # of a file, by which an otherwise undisturbed one is recognised
 SAMPLES = 200  # of a posterior, for its share out of tolerance
 SEPARATE = 1.0  # logarithm of the evidence below which two causes are not separated
+RARE = 1e-3  # probability of a cause below which it is not grouped
 PROMISING = 15.0  # logarithm of the evidence below the best, from which samples are omitted
 
 IndexArray = NDArray[np.intp]
@@ -104,34 +105,38 @@ class Hypothesis:
     causes: tuple[int, ...]
     rows: IndexArray  # their coefficients
     variance: Array  # of each
-    log_prior: float
     inverse: Array  # K⁻¹
     log_constant: float
-
-    @classmethod
-    def of(
-        cls,
-        causes: tuple[int, ...],
-        rows: IndexArray,
-        variance: Array,
-        log_prior: float,
-        covariance: Array,
-    ) -> "Hypothesis":
-        loss = 1.0 / WITHIN**2 - 1.0 / variance
-        kernel = np.diag(1.0 / loss) - covariance[np.ix_(rows, rows)]
-        constant = np.linalg.slogdet(kernel)[1] + np.sum(np.log(loss * variance / WITHIN**2))
-        inverse = np.linalg.inv(kernel)
-        return cls(causes, rows, variance, log_prior, inverse, -0.5 * float(constant))
-
-    def with_covariance(self, covariance: Array) -> "Hypothesis":
-        """Return the hypothesis after further readings."""
-        known = self.causes, self.rows, self.variance, self.log_prior
-        return Hypothesis.of(*known, covariance)
 
     def log_ratio(self, means: Array) -> Array:
         """Compute the log evidence relative to all causes within tolerance, [...]."""
         part = means[..., self.rows]
-        return self.log_constant + 0.5 * np.einsum("...i,ij,...j", part, self.inverse, part)
+        return self.log_constant + 0.5 * np.sum((part @ self.inverse) * part, axis=-1)
+
+
+def build_hypotheses(
+    blocks: Sequence[IndexArray], covariance: Array, sets: Iterable[tuple[int, ...]]
+) -> tuple[Hypothesis, ...]:
+    """Build the hypotheses of some sets of causes, for all of `FACTORS`; matrices in batches."""
+    by_size: dict[int, list[tuple[tuple[int, ...], IndexArray, Array]]] = {}
+    for causes in sets:
+        rows = np.concatenate([blocks[cause] for cause in causes])
+        for factors in product(FACTORS, repeat=len(causes)):
+            variance = [np.full(len(blocks[c]), f**2) for c, f in zip(causes, factors, strict=True)]
+            by_size.setdefault(len(rows), []).append((causes, rows, np.concatenate(variance)))
+    hypotheses: list[Hypothesis] = []
+    for batch in by_size.values():
+        variance, rows = (np.stack([row[at] for row in batch]) for at in (2, 1))
+        loss = 1.0 / WITHIN**2 - 1.0 / variance
+        kernel = np.eye(rows.shape[1]) / loss[:, None] - covariance[rows[:, :, None], rows[:, None]]
+        constant = np.linalg.slogdet(kernel)[1]
+        constant += np.sum(np.log(loss * variance / WITHIN**2), axis=1)
+        inverse = np.linalg.inv(kernel)
+        for at, (causes, indices, widths) in enumerate(batch):
+            hypotheses.append(
+                Hypothesis(causes, indices, widths, inverse[at], -0.5 * float(constant[at]))
+            )
+    return tuple(hypotheses)
 
 
 @dataclass(frozen=True)
@@ -163,25 +168,17 @@ class CauseModel:
 
     @cached_property
     def hypotheses(self) -> tuple[Hypothesis, ...]:
-        return tuple(self._build_hypotheses())
+        count = range(len(self.causes))
+        sets = [*((cause,) for cause in count), *combinations(count, 2)]
+        return build_hypotheses(self.blocks, self.normal.covariance, sets)
 
-    def _build_hypotheses(self) -> Iterator[Hypothesis]:
-        count = len(self.causes)
-        pairs = [*combinations(range(count), 2)]
-        for size, sets, prior in (
-            (1, [(cause,) for cause in range(count)], PRIOR_ONE),
-            (2, pairs, PRIOR_TWO),
-        ):
-            log_prior = np.log(prior / max(len(sets), 1) / len(FACTORS) ** size)
-            for members in sets:
-                rows = np.concatenate([self.blocks[cause] for cause in members])
-                for factors in product(FACTORS, repeat=size):
-                    widths = [np.full(len(self.blocks[c]), f) for c, f in
-                              zip(members, factors, strict=True)]  # fmt: skip
-                    variance = np.concatenate(widths) ** 2
-                    yield Hypothesis.of(
-                        members, rows, variance, float(log_prior), self.normal.covariance
-                    )
+    @cached_property
+    def _log_priors(self) -> Array:
+        """Prior of each hypothesis, and of none, last, [H + 1]."""
+        sizes = [len(hypothesis.causes) for hypothesis in self.hypotheses]
+        priors = {size: np.log(total / max(sizes.count(size), 1))
+                  for size, total in ((1, PRIOR_ONE), (2, PRIOR_TWO))}  # fmt: skip
+        return np.array([*(priors[size] for size in sizes), np.log(PRIOR_WITHIN)])
 
     # --- not geometric ----------------------------------------------------------------------------
 
@@ -212,7 +209,9 @@ class CauseModel:
             for factor in FACTORS if bends.size else ():
                 normal = Normal.of(np.hstack([self._columns, bends * factor / WITHIN]),
                                    seen.by_unknown)  # fmt: skip
-                models.append((name, normal, float(np.log(PRIOR_NOT_GEOMETRIC / 4.0 / len(FACTORS)))))
+                models.append(
+                    (name, normal, float(np.log(PRIOR_NOT_GEOMETRIC / 4.0 / len(FACTORS))))
+                )
         return models
 
     def _log_outliers(self, deviations: Array, weighted: Array) -> Array:
@@ -248,9 +247,7 @@ class CauseModel:
         """Compute the probabilities for readings of these plans, [N]."""
         readings = self.observations.deviations if deviations is None else deviations
         mean, base, weighted = self.normal.condition(readings)
-        logs = [float(h.log_ratio(mean)) + h.log_prior for h in self.hypotheses]
-        logs.append(float(np.log(PRIOR_WITHIN)))
-        weights = np.array(logs)
+        weights = np.array([*(h.log_ratio(mean) for h in self.hypotheses), 0.0]) + self._log_priors
         best = weights.max()
         for at, hypothesis in enumerate(self.hypotheses):
             if weights[at] > best - PROMISING:
@@ -319,51 +316,60 @@ class CauseModel:
 
     # --- groups -----------------------------------------------------------------------------------
 
-    def group(self, posterior: Posterior) -> list[tuple[tuple[int, ...], ...]]:
+    def group(
+        self, posterior: Posterior
+    ) -> tuple[list[tuple[tuple[int, ...], ...]], tuple[tuple[int, ...], ...]]:
         """Group causes that the readings do not separate, each with the likeliest one first.
 
         Readings as a cause would produce them, with its likeliest amplitude, are explained by
         another one: the two are not separated where the evidence differs by less than `SEPARATE`,
-        in both directions.
+        in both directions. Causes below `RARE` are returned apart.
         """
-        ranked = sorted(posterior.causes, key=lambda causes: -posterior.causes[causes])
-        best: dict[tuple[int, ...], Hypothesis] = {}
-        for at, hypothesis in enumerate(self.hypotheses):
-            weight = posterior.weights[at]
-            present = best.get(hypothesis.causes)
-            if present is None or weight > self._weight_of(present, posterior):
-                best[hypothesis.causes] = hypothesis
-        typical = {causes: self._predict(best[causes], posterior.mean) for causes in ranked}
+        shares = posterior.causes
+        ranked = sorted(shares, key=lambda causes: -shares[causes])
+        likely = [causes for causes in ranked if shares[causes] >= RARE]
+        best: dict[tuple[int, ...], tuple[float, Hypothesis]] = {}
+        for weight, hypothesis in zip(posterior.weights, self.hypotheses, strict=False):
+            if weight > best.get(hypothesis.causes, (-np.inf, None))[0]:
+                best[hypothesis.causes] = weight, hypothesis
+        typical = {causes: self._predict(best[causes][1], posterior.mean) for causes in likely}
+
+        def is_explained(causes: tuple[int, ...], other: tuple[int, ...]) -> bool:
+            mean = typical[causes]
+            gain = best[causes][1].log_ratio(mean) - best[other][1].log_ratio(mean)
+            return float(gain) < SEPARATE
+
         groups: list[list[tuple[int, ...]]] = []
-        for causes in ranked:
+        for causes in likely:
             for group in groups:
-                if self._is_alike(best[group[0]], best[causes], typical):
+                if is_explained(group[0], causes) and is_explained(causes, group[0]):
                     group.append(causes)
                     break
             else:
                 groups.append([causes])
-        return [tuple(group) for group in groups]
+        ordered = sorted(groups, key=lambda group: -sum(shares[causes] for causes in group))
+        return [tuple(group) for group in ordered], tuple(ranked[len(likely) :])
 
-    def _weight_of(self, hypothesis: Hypothesis, posterior: Posterior) -> float:
-        return float(posterior.weights[self._places[id(hypothesis)]])
+    def gained_bits(self, posterior: Posterior) -> float:
+        """Compute the information of the readings on the cause: posterior relative to prior."""
+        logs = posterior.weights - self._log_priors
+        bits = float(np.exp(posterior.weights) @ logs)
+        disturbed = sum(posterior.not_geometric.values())
+        bits += disturbed * np.log(max(disturbed, 1e-300) / PRIOR_NOT_GEOMETRIC)
+        return float(bits / np.log(2.0))
 
-    @cached_property
-    def _places(self) -> dict[int, int]:
-        return {id(hypothesis): at for at, hypothesis in enumerate(self.hypotheses)}
+    def fitted_values(self, causes: tuple[int, ...], posterior: Posterior) -> Array:
+        """Compute the variables of causes out of tolerance, their likeliest values, [V]."""
+        places = [at for at, h in enumerate(self.hypotheses) if h.causes == causes]
+        hypothesis = self.hypotheses[max(places, key=lambda at: posterior.weights[at])]
+        centre, _ = self.moments(hypothesis, posterior.mean)
+        basis = np.hstack([self.causes[cause].basis for cause in causes])
+        return basis @ centre
 
     def _predict(self, hypothesis: Hypothesis, mean: Array) -> Array:
         """Return the mean of all coefficients that readings of the fitted cause would produce."""
         centre, _ = self.moments(hypothesis, mean)
         return self.normal.covariance @ (self.normal.information[:, hypothesis.rows] @ centre)
-
-    def _is_alike(
-        self, first: Hypothesis, second: Hypothesis, typical: dict[tuple[int, ...], Array]
-    ) -> bool:
-        for one_way, other in ((first, second), (second, first)):
-            mean = typical[one_way.causes]
-            if float(one_way.log_ratio(mean) - other.log_ratio(mean)) > SEPARATE:
-                return False
-        return True
 
 
 def log_sum(logs: Array) -> float:

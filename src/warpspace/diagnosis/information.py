@@ -15,6 +15,7 @@ from warpspace.diagnosis.evidence import (
     Hypothesis,
     Observations,
     Posterior,
+    build_hypotheses,
 )
 from warpspace.diagnosis.observations import observe
 from warpspace.calibration.calibration_result import Candidate
@@ -23,6 +24,7 @@ from warpspace.units import Array
 DRAWS = 96  # readings of each candidate that are drawn from the posterior
 MAX_HYPOTHESES = 60  # the likeliest ones, among which a test decides
 LEAST_WEIGHT = 8.0  # logarithm below the best one from which a hypothesis is left out
+ENOUGH = 0.5  # share of the largest information that a proposed test has
 MIN_BITS = 0.02  # of a test that is proposed
 
 
@@ -78,7 +80,10 @@ def rank_tests(
     order = np.argsort(-posterior.weights[:-1])[:MAX_HYPOTHESES]
     best = float(posterior.weights.max())
     order = order[posterior.weights[order] > best - LEAST_WEIGHT]
-    chosen = [model.hypotheses[at] for at in order]
+    listed = list(dict.fromkeys(model.hypotheses[at].causes for at in order))
+    place = {(h.causes, tuple(h.variance)): at for at, h in enumerate(model.hypotheses)}
+    chosen = build_hypotheses(model.blocks, model.normal.covariance, listed)
+    order = [place[h.causes, tuple(h.variance)] for h in chosen]
     weights = np.append(posterior.weights[order], posterior.weights[-1])
     shares = np.exp(weights - weights.max())
     shares /= shares.sum()
@@ -101,7 +106,7 @@ def rank_tests(
         covariance = np.linalg.inv(information + gram)
         noise = rng.standard_normal((DRAWS, len(columns))) @ columns
         means = (weighted_sum + coefficients @ gram + noise) @ covariance
-        later = [h.with_covariance(covariance).log_ratio(means) for h in chosen]
+        later = [h.log_ratio(means) for h in build_hypotheses(model.blocks, covariance, listed)]
         logs = weights - present + np.stack([*later, np.zeros(DRAWS)], -1)
         after = np.exp(logs - logs.max(axis=1, keepdims=True))
         after = after @ member / after.sum(axis=1, keepdims=True)
@@ -114,7 +119,9 @@ def rank_tests(
                 {name: max(float(gain), 0.0) for name, gain in zip(sets, by_cause, strict=True)},
             )
         )
-    return sorted(tests, key=lambda test: -test.bits / test.minutes)
+    enough = ENOUGH * max((test.bits for test in tests), default=0.0)
+    useful = [test for test in tests if test.bits >= max(enough, MIN_BITS)]
+    return sorted(useful, key=lambda test: -test.bits / test.minutes)
 
 
 def _draw(

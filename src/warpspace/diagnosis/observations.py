@@ -136,7 +136,9 @@ def read_symptom(text: str, scene: Scene) -> Symptom:
     """
     if len(text) > MAX_LETTERS:
         raise OptionError(f"{{symptoms}} of {len(text)} letters; expected at most {MAX_LETTERS}")
-    plain = " ".join(re.sub(r"[,;:]", " ", text.lower().replace("×", "x").replace("μ", "µ")).split())
+    plain = " ".join(
+        re.sub(r"[,;:]", " ", text.lower().replace("×", "x").replace("μ", "µ")).split()
+    )
     examples = "; ".join(f"“{example}”" for _, example in FORMS.values())
     for word in re.findall(r"[^\W\d_]+", plain):
         if word not in WORDS:

@@ -3,13 +3,14 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.blocks import Lines, Table
 from warpspace.analysis.description import Analysis, ProgressCallback, Result
+from warpspace.analysis.options import Grammar, option
 from warpspace.analysis.registry import Entry
 from warpspace.app.browser import actions as do
 from warpspace.app.browser.html import EMPTY, join
@@ -33,6 +34,7 @@ from warpspace.calibration.calibrate import Calibrate
 from warpspace.calibration.calibration_result import Calibration
 from warpspace.calibration.readings import bundled_data, find_data, parse_reading_table
 from warpspace.calibration.registry import KINDS, parse_readings
+from warpspace.diagnosis.diagnose import Diagnose, Diagnosis
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import decode_text
@@ -317,3 +319,50 @@ def _kind_words(kind: str) -> str:
     if name in KINDS:
         return KINDS[name].description
     return find_test(name).title if name in bench_names() else name
+
+
+# --- Diagnosis ------------------------------------------------------------------------------------
+
+
+def _split_symptoms(text: str, _scene: Scene) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(";") if part.strip())
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiagnoseTexts(Diagnose):
+    symptoms: Annotated[tuple[str, ...], Grammar("TEXT", _split_symptoms)] = option(
+        (),
+        "circle of 100 mm oval by 30 µm at 45°, same in both directions; plate of 300 x 200 mm"
+        " diagonals differ by 0.2 mm; taper 0.03 on 300; step of 20 µm where Y reverses."
+        " Several are separated by semicolons",
+        flag="--symptom",
+        label="Symptoms",
+    )
+    files: tuple[UploadedFile, ...] = ()
+
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> Diagnosis:
+        reading_sets = [
+            parse_readings(file.content, file.name, scene, file.kind, self.frame)
+            for file in self.files
+        ]
+        return self.diagnose_readings(scene, reading_sets, watch)
+
+
+class DiagnosePanel(CalibratePanel):
+    """Uploaded readings and typed symptoms, and the causes that explain them."""
+
+    own_kind = DiagnoseTexts
+    sentence = "The likeliest causes of readings or symptoms, and the checks that confirm them"
+    run_label = "Diagnose"
+
+    def defaults(self, state: AppState) -> Mapping[str, str]:
+        return AnalysisPanel.defaults(self, state)
+
+    def is_ready(self, state: AppState) -> bool:
+        return bool(self.files) or bool(self.values(state).get("symptoms", "").strip())
+
+    def headline(self, result: Result) -> Markup:
+        return AnalysisPanel.headline(self, result)
+
+    def result_html(self, result: Result) -> Markup:
+        return AnalysisPanel.result_html(self, result)
