@@ -3,7 +3,7 @@
 The exact chain (see CONVENTIONS) is multiplied for all poses of a test at once; of the product only
 the poses and sensed directions of a test are used, not its derivatives. Causes are drawn as
 docs/diagnosis.md states: within tolerance a curve has a standard deviation of half a half-width, a
-cause out of tolerance two or five, and exceeds the half-width somewhere.
+cause out of tolerance three or eight half-widths, and exceeds the half-width somewhere.
 """
 
 from dataclasses import dataclass, field, replace
@@ -25,6 +25,7 @@ class HiddenMachine:
     errors: dict = field(default_factory=dict)  # key: value, or values at knots
     reversal: dict = field(default_factory=dict)  # axis: forward minus backward
     lag: dict = field(default_factory=dict)  # axis: at the feed of a circle, along its motion
+    bends: np.ndarray = None  # bow, twist and bow of the plate, µm
 
     def add(self, key, values):
         self.errors[key] = self.errors.get(key, 0.0) + np.asarray(values, float)
@@ -119,6 +120,10 @@ def measure(machine, readings, rng):
     length = np.where(bar, plan.length_mm, 1.0)[:, None]
     stretched = np.linalg.norm(length * plan.direction + shift, axis=1) - length[:, 0]
     read = plan.gain * np.where(bar, stretched, np.sum(shift * plan.direction, axis=1))
+    if kind == "ball-plate":
+        count = len(read) // 3
+        row, column = (plan.marks[name][:count] / 2.0 - 1.0 for name in ("row", "column"))
+        read[2 * count :] += np.stack([row**2, row * column, column**2], -1) @ machine.bends * 1e-3
     read = read + sum(rng.normal(0.0, 0.03) * column for column in plan.setup.values())
     return (read + rng.normal(0.0, NOISE_MM, len(read)))[:, None]
 
@@ -142,6 +147,11 @@ def half_width(scene, key):
     return scene.tolerances.get(key).half_width
 
 
+def smallest_um(scene):
+    widths = [half_width(scene, key) for key in scene.parameter_keys if key[1] in LINEAR]
+    return min(filter(None, widths))
+
+
 def along(axis):
     return f"E{axis[0]}{axis}"
 
@@ -152,7 +162,7 @@ def names_of(scene):
     names = [key for key in scene.parameter_keys if half_width(scene, key)]
     names += [f"reversal of {axis}" for axis in axes]
     names += [f"servo mismatch {a}{b}" for a, b in combinations(linear, 2)]
-    return [*names, "scale temperature"]
+    return [*names, "bent plate", "scale temperature"]
 
 
 def add_cause(machine, name, factor, rng):
@@ -181,6 +191,11 @@ def add_cause(machine, name, factor, rng):
         axis = name.rpartition(" ")[2]
         key = f"E{'ABC'['ABC'.index(axis[0])]}{axis}" if axis[0] in "ABC" else along(axis)
         machine.reversal[axis] = half_width(scene, key) * scalar()
+    elif name == "bent plate":
+        bends = factor * rng.standard_normal(3)
+        while factor > 1.0 and np.abs(bends).max() <= 1.0:
+            bends = factor * rng.standard_normal(3)
+        machine.bends = smallest_um(scene) * bends
     elif name.startswith("servo"):
         first, second = name.rpartition(" ")[2]
         size = min(half_width(scene, along(first)), half_width(scene, along(second))) * scalar()
@@ -198,28 +213,21 @@ def add_cause(machine, name, factor, rng):
 def draw(scene, rng):
     """Draw a machine and the truth: names of causes, "within", or "not geometric" and how."""
     machine, names = HiddenMachine(scene), names_of(scene)
-    kind = rng.choice(4, p=[0.2, 0.55, 0.1, 0.15])
+    kind = rng.choice(4, p=[0.2, 0.58, 0.1, 0.12])
     count = [0, 1, 2, 0][kind]
     causes = [names[at] for at in rng.choice(len(names), count, replace=False)]
+    factor = rng.choice([3.0, 8.0])
     for name in names:
-        add_cause(machine, name, rng.choice([2.0, 5.0]) if name in causes else 0.5, rng)
+        add_cause(machine, name, factor if name in causes else 0.5, rng)
     return machine, frozenset(causes), ["within", "causes", "causes", "disturbed"][kind]
 
 
 def disturb(sets, scene, rng):
-    """Disturb readings as a bent plate, outliers, or a disturbed instrument would; name it."""
-    widths = [half_width(scene, key) for key in scene.parameter_keys if key[1] in LINEAR]
-    size = min(filter(None, widths)) * 1e-3
-    how = rng.choice(["noise", "bent", "outliers"], p=[0.5, 0.25, 0.25])
+    """Disturb readings as outliers or a disturbed instrument would; name it."""
+    size = smallest_um(scene) * 1e-3
+    how = rng.choice(["noise", "outliers"])
     sets = list(sets)
-    if how == "bent":
-        at = next(i for i, r in enumerate(sets) if r.kind.startswith("ball-plate"))
-        marks, count = sets[at].plan.marks, len(sets[at]) // 3
-        row, column = (marks[x][:count] / 2.0 - 1.0 for x in ("row", "column"))
-        bend = np.stack([row**2, row * column, column**2], -1) @ rng.standard_normal(3)
-        moved = sets[at].observed_mm.copy()
-        moved[2 * count :, 0] += rng.choice([2.0, 5.0]) * size * bend
-    elif how == "noise":
+    if how == "noise":
         at = rng.integers(len(sets))
         scale = rng.choice([0.3, 1.0, 3.0]) * size
         moved = sets[at].observed_mm + rng.normal(0.0, scale, sets[at].observed_mm.shape)

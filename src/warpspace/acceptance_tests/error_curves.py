@@ -107,13 +107,14 @@ class ErrorCurves:
             basis = build_basis(scene.model, scene.errors, self.keys, at, scene.view(), points)
             return np.moveaxis(basis.position.reshape(len(self.keys), -1, 3), 0, -1)
 
-        return self._responses(respond_nodes)
+        return self.respond(respond_nodes)
 
     def readings(self, plan: BenchPlan) -> Array:
         """Compute the response of the readings of a test to each value, [m, V]."""
-        return self._responses(lambda scene: respond(scene, plan, self.keys))
+        return self.respond(lambda scene: respond(scene, plan, self.keys))
 
-    def _responses(self, evaluate: Callable[[Scene], Array]) -> Array:
+    def respond(self, evaluate: Callable[[Scene], Array]) -> Array:
+        """Compute the response to each value, [..., V], from that to each error, [..., K]."""
         columns = {variable: index for index, variable in enumerate(self.variables)}
         responses = np.zeros(0)
         for knot, unit in enumerate(np.eye(self.knots)):

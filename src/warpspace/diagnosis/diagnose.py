@@ -1,62 +1,58 @@
-"""Diagnosis: the causes that explain readings and symptoms, and the checks that separate them."""
+"""Diagnosis: the likeliest causes of readings and symptoms, and the checks that separate them."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import partial, reduce
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table
 from warpspace.analysis.description import NO_JSON, Analysis, ProgressCallback, Result
 from warpspace.analysis.options import Files, Grammar, option, typed_word
-from warpspace.bench.base import BenchTest, find_test
-from warpspace.bench.plan import simulate
-from warpspace.bench.placing import PLANES
+from warpspace.calibration.next_best import candidates
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import read_readings
 from warpspace.calibration.solve import MeasurementModel
-from warpspace.diagnosis.causes import (
-    CauseKind,
-    ErrorVariables,
-    build_causes,
-    half_width_of,
-    titles,
+from warpspace.diagnosis.causes import CauseSet
+from warpspace.diagnosis.evidence import (
+    PRIOR_NOT_GEOMETRIC,
+    PRIOR_SYMPTOM_WRONG,
+    RARE,
+    Causes,
+    Diagnostics,
+    Observations,
+    Posterior,
 )
-from warpspace.diagnosis.evidence import CauseModel, Posterior
-from warpspace.diagnosis.information import InformativeTest, plan_candidates, rank_tests
-from warpspace.diagnosis.observations import (
-    MAX_SYMPTOMS,
-    SYMPTOM_SHARE,
-    observe,
-    observe_symptoms,
-    read_symptom,
-)
-from warpspace.exceptions import OptionError, SceneError, WarpspaceError
+from warpspace.diagnosis.information import ProposedTest, rank_tests
+from warpspace.diagnosis.symptoms import SYMPTOM_SHARE, check_symptoms, observe, read_symptom
+from warpspace.exceptions import OptionError
+from warpspace.machine.axes import parameter
 from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.resources import assets_dir
-from warpspace.scene.model import Scene, evaluate
+from warpspace.scene.model import Scene
 from warpspace.scene.text_files import parse_toml, read_text
-from warpspace.units import MM_PER_UM, Array
+from warpspace.units import MM_PER_UM
 
-MAX_NEXT = 10
-EXPLAINED, LISTED = 3, 0.01  # groups that are explained; probability of a group that is listed
-MAX_GROUP = 3  # members above which readings are said to reveal little
-MIN_GAINED_BITS = 0.1
-EFFECT_NODES = 5
-NOT_GEOMETRIC = "not_geometric"
+MAX_NEXT, MAX_SYMPTOMS = 10, 8
+EXPLAINED, LISTED = 3, 0.01  # causes that are explained, and probability of one that is listed
+NAMED = 8  # causes of a group that are named
+NEGLIGIBLE = 1e-6  # reading per half-width, in standard uncertainties
+MANY = 3  # causes of a group that readings should separate before an adjustment
+MIN_GAIN_BITS = 0.1  # information of readings that reveal a cause
+KIND = Grammar("KIND", typed_word, each=True)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Diagnose(Analysis):
     """Rank the causes of readings and symptoms of SCENE.
 
-    All errors are within the tolerances of SCENE, except one or two. Reversal, servo mismatch, the
-    temperature of the scales and readings that are not geometric compete with them. Causes that the
-    readings do not separate form a group. Reports for each its probability, the machine element,
-    its effects, the remedy, and the test that confirms it; and the checks with the largest expected
-    information per minute of work. The errors of SCENE are not used.
+    All errors are within the tolerances of SCENE, except one or two. Reversals, servo mismatches,
+    warm scales and readings that are not geometric compete with them. Causes that the readings do
+    not separate form a group. Reports the machine element, the effect and the remedy of each cause,
+    the test that confirms it, and the checks with the largest expected information per minute. The
+    errors of SCENE are not used.
     """
 
     name = "diagnose"
@@ -64,27 +60,23 @@ class Diagnose(Analysis):
     doing = "diagnosing"
     has_table = True
     data: Files = option((), "CSV file of readings, or the name of a bundled one")
-    kinds: Annotated[tuple[str, ...], Grammar("KIND", typed_word, each=True)] = option(
+    kinds: Annotated[tuple[str, ...], KIND] = option(
         (),
-        "points, tracker, sphere, sphere-tcp, lengths, or a test with its options such as"
-        " circular:plane=XZ:radius=150. Once for all files, or once for each",
+        "Kind of the readings, as in calibrate: points, lengths, circular:plane=XZ:radius=150, …"
+        " Once for all files, or once for each",
         flag="--kind",
         unset="recognised from the columns of each file",
-    )
-    frame: Literal["machine", "workpiece"] | None = option(
-        None, "Frame of error vectors whose columns do not name it", unset="workpiece"
     )
     symptoms: Annotated[tuple[str, ...], Grammar("TEXT", typed_word, each=True)] = option(
         (),
         "Symptom in words: circle of 100 mm oval by 30 µm at 45°, same in both directions; plate of"
-        " 300 x 200 mm: diagonals differ by 0.2 mm; taper 0.03 on 300 along X across Y; step of 20"
-        " µm where Y reverses",
+        " 300 x 200 mm: diagonals differ by 0.2 mm; taper 0.03 on 300 along X across Y; step of"
+        " 20 µm where Y reverses",
         flag="--symptom",
-        label="Symptoms",
     )
     noise_um: float = option(
         1.0,
-        "Standard uncertainty of readings without a column u_um, with all that repeats only once",
+        "Standard uncertainty of a reading without a column u_um",
         unit="µm",
         low=1e-3,
         high=1e3,
@@ -92,104 +84,82 @@ class Diagnose(Analysis):
     next_count: int = option(3, "Checks that are proposed", flag="--next", low=1, high=MAX_NEXT)
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "Diagnosis":
-        kinds = self.kinds if len(self.kinds) > 1 else (self.kinds or (None,)) * len(self.data)
-        if len(kinds) != len(self.data):
-            raise OptionError(
-                f"{len(kinds)} values of {{kinds}} for {len(self.data)} files; expected 1 or"
-                f" {len(self.data)}"
-            )
-        sets = [
-            read_readings(name, scene, kind, self.frame)
-            for name, kind in zip(self.data, kinds, strict=True)
-        ]
-        return self.diagnose_readings(scene, sets, watch)
-
-    def diagnose_readings(
-        self, scene: Scene, sets: Sequence[Readings], watch: ProgressCallback
-    ) -> "Diagnosis":
-        """Rank the causes of readings, and of the symptoms."""
-        if not sets and not self.symptoms:
-            raise OptionError(
-                "no readings and no symptoms; expected {data} FILE or {symptoms} TEXT"
-            )
-        if len(self.symptoms) > MAX_SYMPTOMS:
-            raise OptionError(
-                f"{{symptoms}}: {len(self.symptoms)}; expected at most {MAX_SYMPTOMS}"
-            )
-        variables = ErrorVariables(scene)
-        causes = build_causes(variables)
-        symptoms = [read_symptom(text, scene) for text in self.symptoms]
-        observations = observe_symptoms(variables, symptoms) if symptoms else None
-        noise_mm = self.noise_um * MM_PER_UM
-        if sets:
-            labelled = [replace(readings, source=Path(readings.source).name) for readings in sets]
-            model = MeasurementModel.of(scene, labelled, partial(watch, 0.0))
-            seen = observe(variables, model, noise_mm)
-            observations = seen if observations is None else seen.joined(observations)
-        assert observations is not None  # noqa: S101 - for the type checker
-        watch(0.2)
-        model = CauseModel(causes, observations)
-        posterior = model.infer()
-        groups, others = model.group(posterior)
-        watch(0.4)
-        planned = plan_candidates(variables, noise_mm, lambda share: watch(0.4 + 0.3 * share))
-        tests = rank_tests(model, posterior, planned, lambda share: watch(0.7 + 0.2 * share))
-        explained = _Explanations(scene, variables, model, posterior, tests, load_remedies())
-        entries = [explained.explain(group, rank) for rank, group in enumerate(groups)]
-        if others:
-            entries.append(replace(explained.explain(others, len(groups)), is_rest=True))
-        watch(1.0)
-        zero = [key for key in variables.keys if not half_width_of(scene, key)]
-        return Diagnosis(
-            scene=scene,
-            causes=tuple(entries),
-            not_geometric=sum(posterior.not_geometric.values()),
-            within_tolerance=posterior.within,
-            next=tuple(ProposedTest.of(test, test.bits) for test in tests[: self.next_count]),
-            files=tuple(Path(readings.source).name for readings in sets),
-            readings=len(observations.deviations),
-            considered=len(causes),
-            disturbed=posterior.not_geometric,
-            gained_bits=model.gained_bits(posterior),
-            remedy_not_geometric=explained.remedies[NOT_GEOMETRIC],
-            notes=(
-                *(note for readings in sets for note in readings.notes),
-                *(f"“{symptom.text}”: {symptom.assumed}" for symptom in symptoms),
-                *_assumptions(sets, symptoms, self.noise_um, zero),
-            ),
+        count = len(self.data)
+        kinds = self.kinds if len(self.kinds) > 1 else (self.kinds or (None,)) * count
+        if len(kinds) != count:
+            raise OptionError(f"{len(kinds)} values of {{kinds}}; expected 1 or {count}")
+        files = zip(self.data, kinds, strict=True)
+        return self.diagnose(
+            [read_readings(*file[:1], scene, file[1]) for file in files], scene, watch
         )
 
-
-def _assumptions(
-    sets: Sequence[Readings], symptoms: Sequence[object], noise_um: float, zero: Sequence[str]
-) -> Iterator[str]:
-    if any(readings.sigma_mm is None for readings in sets):
-        yield f"standard uncertainty of a reading: {noise_um:g} µm (--noise)"
-    if symptoms:
-        yield f"standard uncertainty of a symptom: {SYMPTOM_SHARE:.0%} of its amount"
-    if zero:
-        yield f"{', '.join(zero)}: tolerance of zero, no causes"
-
-
-@dataclass(frozen=True)
-class ProposedTest:
-    """A test with its expected information."""
-
-    test: str
-    options: Mapping[str, Any]
-    information_bits: float
-    minutes: float
-
-    @classmethod
-    def of(cls, test: InformativeTest, bits: float) -> "ProposedTest":
-        return cls(test.name, test.options(), bits, test.minutes)
+    def diagnose(
+        self, sets: Sequence[Readings], scene: Scene, watch: ProgressCallback
+    ) -> "Diagnosis":
+        """Rank the causes of readings and of the symptoms."""
+        if not sets and not self.symptoms:
+            raise OptionError("no readings, no symptoms; expected {data} FILE or {symptoms} TEXT")
+        if len(self.symptoms) > MAX_SYMPTOMS:
+            raise OptionError(f"{len(self.symptoms)} {{symptoms}}; expected at most {MAX_SYMPTOMS}")
+        causes, noise_mm = CauseSet(scene), self.noise_um * MM_PER_UM
+        symptoms = [read_symptom(text, scene) for text in self.symptoms]
+        parts = [symptom.observe(causes) for symptom in symptoms]
+        if parts:
+            check_symptoms(reduce(Observations.joined, parts))
+        if sets:
+            named = [replace(readings, source=Path(readings.source).name) for readings in sets]
+            model = MeasurementModel.of(scene, named, partial(watch, 0.0))
+            parts.append(observe(causes, model, noise_mm))
+        prior = PRIOR_NOT_GEOMETRIC if sets else PRIOR_SYMPTOM_WRONG
+        observations = reduce(Observations.joined, parts)
+        diagnostics = Diagnostics(causes.causes, observations, prior)
+        watch(0.3)
+        posterior = diagnostics.infer()
+        groups, rare = diagnostics.group(posterior)
+        planned = candidates(scene)
+        checks = [
+            (
+                check,
+                observe(
+                    causes,
+                    MeasurementModel.of(scene, [check.readings], partial(watch, 0.5)),
+                    noise_mm,
+                ),
+            )
+            for check in planned
+        ]
+        tests = rank_tests(diagnostics, posterior, checks, lambda share: watch(0.6 + 0.4 * share))
+        explanations = Explanations(causes, diagnostics, posterior, tests)
+        entries = [explanations.explain(group, number) for number, group in enumerate(groups)]
+        if rare:
+            summary = f"{len(rare)} others, each below {RARE:.1%}"
+            entries.append(replace(explanations.explain(rare, EXPLAINED), summary=summary))
+        gain = np.exp(posterior.logs) @ (posterior.logs - diagnostics.log_priors)
+        notes = [f"“{symptom.text}”: {symptom.assumed}" for symptom in symptoms]
+        if symptoms:
+            notes.append(f"standard uncertainty of a symptom: {SYMPTOM_SHARE:.0%} of its amount")
+        if any(readings.sigma_mm is None for readings in sets):
+            notes.append(f"standard uncertainty of a reading: {self.noise_um:g} µm ({{noise_um}})")
+        zero = [key for key in causes.curves.keys if not causes.half_width(key)]
+        notes += [f"{', '.join(zero)}: tolerance 0, no causes"] if zero else []
+        return Diagnosis(
+            title=scene.title,
+            sources=tuple(dict.fromkeys(diagnostics.observations.sets)),
+            causes=tuple(entries),
+            not_geometric=sum(posterior.disturbed.values()),
+            within_tolerance=posterior.within,
+            next=tuple(tests[: self.next_count]),
+            disturbed=max(posterior.disturbed, key=posterior.disturbed.__getitem__),
+            gained_bits=float(gain / np.log(2.0)) + sum(posterior.disturbed.values()),
+            notes=(*(note for readings in sets for note in readings.notes), *notes),
+        )
 
 
 @dataclass(frozen=True)
 class CauseGroup:
     """Causes that the readings do not separate."""
 
-    causes: tuple[str, ...]  # the likeliest: one or two
+    causes: tuple[str, ...]  # the likeliest: one or two out of tolerance
     probability: float  # of the group
     group: tuple[tuple[str, ...], ...]  # the others
     element: str
@@ -197,44 +167,41 @@ class CauseGroup:
     confirm: ProposedTest | None
     remedy: str
     title: str = field(metadata=NO_JSON)
-    is_rest: bool = field(default=False, metadata=NO_JSON)  # causes below 0.1 %
+    summary: str = field(default="", metadata=NO_JSON)  # of causes that are not listed by name
 
     @property
-    def members(self) -> int:
-        """Number of its single causes."""
-        return sum(len(causes) == 1 for causes in (self.causes, *self.group))
+    def alone(self) -> list[str]:
+        """The other causes that explain the readings alone."""
+        return [causes[0] for causes in self.group if len(causes) == 1]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Diagnosis(Result):
     """Causes by probability, and the checks that separate them."""
 
-    scene: Scene = field(metadata=NO_JSON)
-    causes: tuple[CauseGroup, ...]  # the likeliest first; those below 0.1 % are the last
+    json_keys: ClassVar[tuple[str, ...]] = (
+        "causes", "not_geometric", "within_tolerance", "next",
+    )  # fmt: skip
+    title: str
+    sources: tuple[str, ...]  # files and symptoms
+    causes: tuple[CauseGroup, ...]  # the likeliest first; last those below 0.1 %
     not_geometric: float
     within_tolerance: float
     next: tuple[ProposedTest, ...]
-    files: tuple[str, ...] = field(metadata=NO_JSON)
-    readings: int = field(metadata=NO_JSON)
-    considered: int = field(metadata=NO_JSON)
-    disturbed: Mapping[str, float] = field(metadata=NO_JSON)
-    gained_bits: float = field(metadata=NO_JSON)
-    remedy_not_geometric: str = field(metadata=NO_JSON)
-    notes: tuple[str, ...] = field(default=(), metadata=NO_JSON)
+    disturbed: str  # likeliest disturbed file
+    gained_bits: float
+    notes: tuple[str, ...]
 
     def blocks(self) -> Iterator[Block]:
-        sources = ", ".join(self.files) or "symptoms"
-        yield f"{self.scene.title} · {sources} · {self.considered} causes considered"
-        rows: list[tuple[Any, ...]] = []
+        yield f"{self.title} · {'; '.join(self.sources)}"
+        rows: list[tuple[str, float, str]] = []
         for entry in self.causes:
-            alike = entry.members - 1
-            text = f"{entry.title}{f' or {alike} more' if alike > 0 else ''}"
-            if entry.is_rest:
-                text = f"{len(entry.group) + 1} others, each below 0.1 %"
+            more = f" or {len(entry.alone)} more" if entry.alone else ""
+            element = "" if entry.summary else entry.element
             if entry.probability >= LISTED:
-                rows.append((text, 100.0 * entry.probability, entry.element * (not entry.is_rest)))
-        where = max(self.disturbed, key=lambda name: self.disturbed[name], default="")
-        rows.append(("not geometric", 100.0 * self.not_geometric, where))
+                name = entry.summary or entry.title + more
+                rows.append((name, 100.0 * entry.probability, element))
+        rows.append(("not geometric", 100.0 * self.not_geometric, self.disturbed))
         rows.append(("all errors within tolerance", 100.0 * self.within_tolerance, ""))
         yield Table(
             (
@@ -243,129 +210,111 @@ class Diagnosis(Result):
                 Column("element", wraps=True, key="element"),
             ),
             rows,
-            title="Causes",
         )
         for entry in self.causes[:EXPLAINED]:
-            if entry.probability < LISTED or entry.is_rest:
+            if entry.summary or entry.probability < LISTED:
                 continue
             yield f"{entry.title}: {100.0 * entry.probability:.0f} %"
-            alone = [" and ".join(causes) for causes in entry.group if len(causes) == 1]
-            if alone:
-                yield f"  not separated from {', '.join(alone)}"
-            if entry.effect:
-                yield f"  effects: {entry.effect}"
+            if entry.alone:
+                more = len(entry.alone) - NAMED
+                names = ", ".join(entry.alone[:NAMED]) + f" and {more} more" * (more > 0)
+                yield f"  not separated from {names}"
+            yield f"  effect: {entry.effect}"
             if entry.confirm is not None:
                 yield f"  confirm: {entry.confirm.test}, {entry.confirm.minutes:.0f} min"
             yield f"  remedy: {entry.remedy}"
         if self.not_geometric >= LISTED:
-            yield f"not geometric: {self.remedy_not_geometric}"
+            yield f"not geometric: {load_remedies()['not geometric'][1]}"
         yield Table(
             (
-                Column("check", wraps=True, leads=True),
+                Column("next check", wraps=True, leads=True),
                 Column("information", ".2f", "bits"),
                 Column("time", ".0f", "min"),
             ),
-            [(step.test, step.information_bits, step.minutes) for step in self.next],
-            title="Next checks, by information per minute",
-            empty="  No check separates the causes further.",
+            [(test.test, test.information_bits, test.minutes) for test in self.next],
+            empty="No check separates the causes further.",
         )
 
     def caveats(self) -> Iterator[str]:
         yield from super().caveats()
         yield from self.notes
-        first = max(self.causes, key=lambda entry: entry.probability, default=None)
-        if self.gained_bits < MIN_GAINED_BITS:
-            yield "these readings do not reveal a cause: the probabilities are those assumed before"
-        elif first is not None and (first.members > MAX_GROUP or first.is_rest):
-            yield (
-                f"these readings do not separate {first.members} causes; run one of the next checks"
-                " before an adjustment"
-            )
+        first = max(self.causes, key=lambda entry: entry.probability)
+        count = len(first.alone) + 1
+        if self.gained_bits < MIN_GAIN_BITS:
+            yield "the readings reveal no cause: the probabilities are those before the readings"
+        elif count > MANY:
+            yield f"the readings do not separate {count} causes; run a check before an adjustment"
 
 
 @dataclass(frozen=True)
-class _Explanations:
-    """Element, effects, confirmation and remedy of causes."""
+class Explanations:
+    """Element, effect, confirmation and remedy of causes."""
 
-    scene: Scene
-    variables: ErrorVariables
-    model: CauseModel
+    set: CauseSet
+    diagnostics: Diagnostics
     posterior: Posterior
-    tests: Sequence[InformativeTest]
-    remedies: Mapping[str, str]
+    tests: Sequence[ProposedTest]
 
-    def explain(self, group: Sequence[tuple[int, ...]], rank: int) -> CauseGroup:
-        causes = [[self.model.causes[at] for at in members] for members in group]
+    def explain(self, group: Sequence[Causes], number: int) -> CauseGroup:
+        causes = [[self.set.causes[at] for at in members] for members in group]
         names = [tuple(cause.name for cause in members) for members in causes]
         probability = sum(self.posterior.causes[members] for members in group)
-        is_explained = rank < EXPLAINED and probability >= LISTED
-        kinds = dict.fromkeys(cause.kind for cause in causes[0])
+        is_explained = number < EXPLAINED and probability >= LISTED
+        remedies = [self._find_remedy(name) for name in names[0]]
+        rows = self.diagnostics.likeliest(group[0], self.posterior).rows
+        is_seen = np.any(np.abs(self.diagnostics.normal.columns[:, rows]) > NEGLIGIBLE)
         return CauseGroup(
             causes=names[0],
             probability=probability,
             group=tuple(names[1:]),
-            element="; ".join(cause.element for cause in causes[0]),
+            element="; ".join(element for element, _ in remedies),
             effect=self._describe_effect(group[0]) if is_explained else "",
-            confirm=self._confirm(group) if is_explained else None,
-            remedy=" ".join(self.remedies[kind.value] for kind in kinds),
-            title=titles(causes[0]),
+            confirm=self._find_test(group[0]) if is_explained else None,
+            remedy=" ".join(dict.fromkeys(remedy for _, remedy in remedies)),
+            title=" and ".join(cause.title for cause in causes[0]),
+            summary="" if is_seen else f"{len(group)} without effect on these readings",
         )
 
-    def _confirm(self, group: Sequence[tuple[int, ...]]) -> ProposedTest | None:
-        gains = [(test.bits_by_cause.get(group[0], 0.0), test) for test in self.tests]
-        useful = [(bits, test) for bits, test in gains if bits > 0.0]
-        if not useful:
-            return None
-        bits, test = max(useful, key=lambda row: row[0] / row[1].minutes)
-        return ProposedTest.of(test, bits)
+    def _find_remedy(self, name: str) -> tuple[str, str]:
+        """Find the element that has a cause, and its remedy."""
+        remedies = load_remedies()
+        if " " in name:
+            element, remedy = next(row for words, row in remedies.items() if name.startswith(words))
+            return element.format(axis=name.rpartition(" ")[2]), remedy
+        row, chain = parameter(name), self.set.scene.machine.chain
+        branch = chain.tool if row.axis in chain.tool else chain.workpiece
+        carrier = ("bed", *branch)[branch.index(row.axis)]
+        element, remedy = remedies[row.name.partition(" of ")[0]]
+        return f"{element.format(axis=row.axis, carrier=carrier)}: {row.name}", remedy
 
-    def _describe_effect(self, members: tuple[int, ...]) -> str:
-        """Describe the largest effects of the fitted causes alone: volume, circles."""
-        values = self.model.fitted_values(members, self.posterior)
-        errors = self.variables.errors(values)
-        names = titles([self.model.causes[at] for at in members])
-        if not list(errors):
-            return ""
-        machine = replace(self.scene, errors=errors, reference=None)
-        volume = evaluate(machine, grid=EFFECT_NODES, placed=False)
-        largest_um = float(np.linalg.norm(volume.error_um, axis=-1).max())
-        parts = [f"{names} alone up to {largest_um:.1f} µm in the volume"]
-        for plane in PLANES:
-            deviation_um = _circular_deviation(machine, plane)
-            if deviation_um is not None and deviation_um >= 1.0:
-                parts.append(f"a circle {plane} out of round by {deviation_um:.1f} µm")
-        return ", ".join(parts)
+    def _find_test(self, causes: Causes) -> ProposedTest | None:
+        """Find the test with the most information per minute on whether these are the causes."""
+        rates = [test.bits_by_causes.get(causes, 0.0) / test.minutes for test in self.tests]
+        return self.tests[int(np.argmax(rates))] if rates and max(rates) > 0.0 else None
 
-
-def _circular_deviation(machine: Scene, plane: str) -> float | None:
-    ranges = machine.workspace.ranges
-    if not {*plane} <= set(ranges):
-        return None
-    radius_mm = 0.4 * min(ranges[axis][1] - ranges[axis][0] for axis in plane)
-    kind: type[BenchTest] = find_test("circular")
-    options: dict[str, Any] = {"plane": plane, "radius_mm": radius_mm, "points": 36}
-    try:
-        test = kind(**options)
-        plan = test.plan(machine)
-        readings: Array = simulate(machine, plan, exact=False)
-        return float(test.evaluate(plan, readings)["circular_deviation_um"])
-    except WarpspaceError:  # the machine cannot run this circle
-        return None
+    def _describe_effect(self, members: Causes) -> str:
+        hypothesis = self.diagnostics.likeliest(members, self.posterior)
+        centre, _ = hypothesis.moments(self.diagnostics.normal, self.posterior.mean)
+        curves, at = self.set.curves, 0
+        values = self.set.basis[:, hypothesis.rows] @ centre
+        error_um = curves.gains @ values[: len(curves.variables)]
+        at = int(np.argmax(np.linalg.norm(error_um, axis=1)))
+        parts = zip("xyz", error_um[at], strict=True)
+        shape = curves.grid.shape
+        place = ", ".join(
+            f"{axis} {float(np.broadcast_to(q, shape).flat[at]):g}"
+            for axis, q in curves.grid.coordinates.items()
+            if axis in self.set.linear_axes
+        )
+        largest = " ".join(f"{letter} {value:+.1f}" for letter, value in parts)
+        return f"up to {largest} µm in the volume, at {place}"
 
 
-def load_remedies() -> dict[str, str]:
-    """Read the table of remedies: text and source of each class of causes."""
+def load_remedies() -> Mapping[str, tuple[str, str]]:
+    """Read element and remedy of each class of causes, with the source."""
     path = assets_dir() / "remedies.toml"
     document = parse_toml(read_text(path, MAX_SCENE_BYTES), str(path))
-    expected = [*(kind.value for kind in CauseKind), NOT_GEOMETRIC]
-    remedies: dict[str, str] = {}
-    problems: list[str] = []
-    for name in expected:
-        row = document.get(name)
-        if isinstance(row, dict) and {"remedy", "source"} <= row.keys():
-            remedies[name] = f"{row['remedy']} ({row['source']})"
-        else:
-            problems.append(f"{name}: expected remedy and source")
-    if problems:
-        raise SceneError(str(path), problems)
-    return remedies
+    return {
+        name: (row["element"], f"{row['remedy']} ({row['source']})")
+        for name, row in document.items()
+    }

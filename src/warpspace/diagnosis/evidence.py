@@ -1,18 +1,17 @@
 """Evidence of causes: Gaussian, in closed form.
 
-The readings are r = A·c + U·s + noise: c are coefficients of the causes, each with a standard
-deviation of `WITHIN` while its cause is within tolerance, s the unknowns of the set-up, with a flat
-prior. A cause out of tolerance has a larger deviation, one of `FACTORS`. With the information
-M = AᵀA + 1/WITHIN² of all causes within tolerance, V = M⁻¹ and x = V·Aᵀr, a hypothesis that enlarges
-the block S of coefficients changes the logarithm of the evidence by
-½·x_Sᵀ·K⁻¹·x_S − ½·log|K·δ| − ½·log|variance/WITHIN²|, where δ is the loss of prior information and
-K = δ⁻¹ − V_SS.
+Readings are r = A·c + U·s + noise. The coefficients c of a cause have a standard deviation of
+`WITHIN` half-widths within tolerance and one of `FACTORS` out of it; the unknowns s of the set-up
+have a flat prior. With M = AᵀA + 1/WITHIN², V = M⁻¹ and x = V·Aᵀr, U eliminated, a hypothesis that
+enlarges the variance of the block S changes the log evidence by
+½·x_Sᵀ·K⁻¹·x_S − ½·log|δ·K| − ½·log|variance/WITHIN²|; δ is the precision it takes from the prior,
+K = δ⁻¹ − V_SS. Draws of the posterior correct for a cause being outside its tolerance somewhere.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations, product
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,78 +20,69 @@ from warpspace.calibration.solve import orthonormal_basis, project_out
 from warpspace.diagnosis.causes import Cause
 from warpspace.units import Array
 
-WITHIN = 0.5  # standard deviation of an error within tolerance, in half-widths
-FACTORS = (2.0, 5.0)  # standard deviations of an error out of tolerance, in half-widths
-PRIOR_WITHIN = 0.2  # of the probability before the readings
-PRIOR_ONE = 0.55  # one cause, each alike
-PRIOR_TWO = 0.1  # two causes, each pair alike
-PRIOR_NOT_GEOMETRIC = 0.15
-NOISE_FACTORS = (0.3, 1.0, 3.0)  # disturbed readings, in half-widths of the smallest translation
-OUTLIER = 5.0  # standard deviation of an outlier, likewise
-MAX_OUTLIERS = 3  # of a file, by which an otherwise undisturbed one is recognised
-SAMPLES = 200  # of a posterior, for its share out of tolerance
-SEPARATE = 1.0  # logarithm of the evidence below which two causes are not separated
-RARE = 1e-3  # probability of a cause below which it is not grouped
-PROMISING = 15.0  # logarithm of the evidence below the best, from which samples are omitted
+WITHIN, FACTORS = 0.5, (3.0, 8.0)  # standard deviations, in half-widths
+PRIOR_WITHIN, PRIOR_ONE, PRIOR_TWO, PRIOR_NOT_GEOMETRIC = 0.2, 0.58, 0.1, 0.12
+PRIOR_SYMPTOM_WRONG = 0.01  # instead of the last one, where there are no readings
+NOISE_FACTORS = (0.3, 1.0, 3.0)  # of disturbed files, in smallest half-widths of a translation
+OUTLIER = 5.0  # standard deviation of outliers, likewise
+MAX_OUTLIERS = 3
+DRAWS = 200  # of a posterior
+PROMISING = 15.0  # log evidence below the best one from which it is not corrected by draws
+SEPARATE = 1.0  # log evidence below which two causes are not separated
+RARE = 1e-3  # probability below which a cause is not grouped
 
-IndexArray = NDArray[np.intp]
+Causes = tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Observations:
-    """Readings divided by their standard uncertainty; nominal is the middle of the tolerances."""
+    """Readings, divided by their standard uncertainty."""
 
-    by_variable: Array  # [N, V] per µm or µrad
+    columns: Array  # [N, P], per coefficient of the causes
     by_unknown: Array  # [N, m]
-    deviations: Array  # [N]; observed − nominal
+    deviations: Array  # [N], from the middle of the tolerances
     sets: tuple[str, ...]  # (N,); file or symptom of each
-    limit: Array  # [N]; half-width of the smallest translation tolerance
-    bends: Array  # [N, b]; low-order bends of artefacts, an amplitude of one half-width
+    tolerance: Array  # [N]; smallest half-width of a translation
 
     def joined(self, other: "Observations") -> "Observations":
         """Append readings with a set-up of their own."""
+        counts = self.by_unknown.shape, other.by_unknown.shape
+        by_unknown = np.zeros(np.add(*counts))
+        by_unknown[: counts[0][0], : counts[0][1]] = self.by_unknown
+        by_unknown[counts[0][0] :, counts[0][1] :] = other.by_unknown
         return Observations(
-            np.vstack([self.by_variable, other.by_variable]),
-            _diagonal(self.by_unknown, other.by_unknown),
+            np.vstack([self.columns, other.columns]),
+            by_unknown,
             np.append(self.deviations, other.deviations),
             (*self.sets, *other.sets),
-            np.append(self.limit, other.limit),
-            _diagonal(self.bends, other.bends),
+            np.append(self.tolerance, other.tolerance),
         )
-
-
-def _diagonal(first: Array, second: Array) -> Array:
-    joined = np.zeros((len(first) + len(second), first.shape[1] + second.shape[1]))
-    joined[: len(first), : first.shape[1]] = first
-    joined[len(first) :, first.shape[1] :] = second
-    return joined
 
 
 @dataclass(frozen=True)
 class Normal:
-    """Normal distribution of the coefficients, all causes within tolerance."""
+    """Distribution of readings with all causes within tolerance."""
 
     columns: Array  # [N, P], set-up eliminated
-    basis: Array  # [N, r], orthonormal, of the set-up
-    information: Array  # [P, P]; of the readings
+    set_up: Array  # [N, r], orthonormal basis
+    information: Array  # [P, P]; of readings and prior
     covariance: Array  # [P, P]
-    log_constant: float  # of the evidence, without the readings
+    log_constant: float  # of the evidence
 
     @classmethod
     def of(cls, columns: Array, by_unknown: Array) -> "Normal":
-        basis = orthonormal_basis(by_unknown)
-        columns = project_out(columns, basis)
-        information, size = columns.T @ columns, columns.shape[1]
-        total = information + np.eye(size) / WITHIN**2
-        set_up = np.linalg.svd(by_unknown, compute_uv=False) if by_unknown.size else np.ones(1)
-        set_up = set_up[set_up > 1e-12 * set_up[0]]
-        constant = -0.5 * np.linalg.slogdet(total)[1] - size * np.log(WITHIN)
-        constant -= float(np.sum(np.log(set_up)))
-        return cls(columns, basis, information, np.linalg.inv(total), constant)
+        set_up = orthonormal_basis(by_unknown)
+        columns = project_out(columns, set_up)
+        size = columns.shape[1]
+        information = columns.T @ columns + np.eye(size) / WITHIN**2
+        volume = np.linalg.slogdet(information)[1] + 2.0 * size * np.log(WITHIN)
+        if set_up.size:  # flat prior
+            volume += np.linalg.slogdet(set_up.T @ by_unknown @ by_unknown.T @ set_up)[1]
+        return cls(columns, set_up, information, np.linalg.inv(information), -0.5 * float(volume))
 
     def condition(self, deviations: Array) -> tuple[Array, float, Array]:
-        """Return mean, [P], log evidence, and the readings weighted by Σ⁻¹, [N]."""
-        readings = project_out(deviations, self.basis)
+        """Return mean, [P], log evidence, and readings weighted by their covariance, [N]."""
+        readings = project_out(deviations, self.set_up)
         mean = self.covariance @ (self.columns.T @ readings)
         weighted = readings - self.columns @ mean
         return mean, self.log_constant - 0.5 * float(readings @ weighted), weighted
@@ -100,276 +90,197 @@ class Normal:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Causes out of tolerance, each with a standard deviation in half-widths."""
+    """Causes out of tolerance, with a standard deviation in half-widths."""
 
-    causes: tuple[int, ...]
-    rows: IndexArray  # their coefficients
-    variance: Array  # of each
+    causes: Causes
+    factor: float
+    rows: NDArray[np.intp]  # of their coefficients
     inverse: Array  # K⁻¹
     log_constant: float
+
+    @classmethod
+    def of(
+        cls, causes: Causes, factor: float, rows: NDArray[np.intp], covariance: Array
+    ) -> "Hypothesis":
+        loss = 1.0 / WITHIN**2 - 1.0 / factor**2
+        kernel = np.eye(len(rows)) / loss - covariance[np.ix_(rows, rows)]
+        volume = np.linalg.slogdet(kernel)[1] + len(rows) * np.log(loss * (factor / WITHIN) ** 2)
+        return cls(causes, factor, rows, np.linalg.inv(kernel), -0.5 * float(volume))
 
     def log_ratio(self, means: Array) -> Array:
         """Compute the log evidence relative to all causes within tolerance, [...]."""
         part = means[..., self.rows]
         return self.log_constant + 0.5 * np.sum((part @ self.inverse) * part, axis=-1)
 
-
-def build_hypotheses(
-    blocks: Sequence[IndexArray], covariance: Array, sets: Iterable[tuple[int, ...]]
-) -> tuple[Hypothesis, ...]:
-    """Build the hypotheses of some sets of causes, for all of `FACTORS`; matrices in batches."""
-    by_size: dict[int, list[tuple[tuple[int, ...], IndexArray, Array]]] = {}
-    for causes in sets:
-        rows = np.concatenate([blocks[cause] for cause in causes])
-        for factors in product(FACTORS, repeat=len(causes)):
-            variance = [np.full(len(blocks[c]), f**2) for c, f in zip(causes, factors, strict=True)]
-            by_size.setdefault(len(rows), []).append((causes, rows, np.concatenate(variance)))
-    hypotheses: list[Hypothesis] = []
-    for batch in by_size.values():
-        variance, rows = (np.stack([row[at] for row in batch]) for at in (2, 1))
-        loss = 1.0 / WITHIN**2 - 1.0 / variance
-        kernel = np.eye(rows.shape[1]) / loss[:, None] - covariance[rows[:, :, None], rows[:, None]]
-        constant = np.linalg.slogdet(kernel)[1]
-        constant += np.sum(np.log(loss * variance / WITHIN**2), axis=1)
-        inverse = np.linalg.inv(kernel)
-        for at, (causes, indices, widths) in enumerate(batch):
-            hypotheses.append(
-                Hypothesis(causes, indices, widths, inverse[at], -0.5 * float(constant[at]))
-            )
-    return tuple(hypotheses)
+    def moments(self, normal: Normal, mean: Array) -> tuple[Array, Array]:
+        """Compute mean and covariance of its coefficients, given the readings."""
+        block = normal.covariance[np.ix_(self.rows, self.rows)]
+        gain = block @ self.inverse
+        return mean[self.rows] + gain @ mean[self.rows], block + gain @ block
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """Probabilities of all explanations of some readings."""
+    """Probabilities of all explanations."""
 
+    causes: dict[Causes, float]  # one or two out of tolerance
     within: float
-    not_geometric: dict[str, float]  # by file
-    causes: dict[tuple[int, ...], float]  # one or two causes out of tolerance
-    mean: Array  # [P]; all causes within tolerance
-    weights: Array  # [H]; log posterior of each hypothesis, and of none, last
+    disturbed: dict[str, float]  # by file, and outliers
+    mean: Array  # [P]; of the coefficients with all causes within tolerance
+    logs: Array  # [H + 1]; of each hypothesis, and of none
 
 
-class CauseModel:
-    """Hypotheses of the causes of readings of certain plans; the readings may change."""
+class Diagnostics:
+    """Hypotheses on the causes of readings; the readings of its tests may be replaced."""
 
-    def __init__(self, causes: Sequence[Cause], observations: Observations) -> None:
+    def __init__(
+        self,
+        causes: Sequence[Cause],
+        observations: Observations,
+        prior_not_geometric: float = PRIOR_NOT_GEOMETRIC,
+    ) -> None:
         self.causes, self.observations = tuple(causes), observations
-        columns = observations.by_variable @ np.hstack([cause.basis for cause in causes])
-        self._columns = columns
-        ends = np.cumsum([0, *(cause.basis.shape[1] for cause in causes)])
-        self.blocks = [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
-        self.normal = Normal.of(columns, observations.by_unknown)
+        self.prior_not_geometric = prior_not_geometric
+        ends = np.cumsum([0, *(cause.shape.shape[1] for cause in causes)])
+        self.blocks = [
+            np.arange(end - c.shape.shape[1], end) for end, c in zip(ends[1:], causes, strict=True)
+        ]
+        self.normal = Normal.of(observations.columns, observations.by_unknown)
+        count = range(len(causes))
+        self.hypotheses = [
+            self.suppose(members, factor, self.normal.covariance)
+            for members in (*((cause,) for cause in count), *combinations(count, 2))
+            for factor in FACTORS
+        ]
+        pairs = len(causes) * (len(causes) - 1) / 2.0
+        one, two = (
+            np.log(p / len(FACTORS)) for p in (PRIOR_ONE / len(causes), PRIOR_TWO / max(pairs, 1.0))
+        )
+        priors = [one if len(h.causes) == 1 else two for h in self.hypotheses]
+        self.log_priors = np.array([*priors, np.log(PRIOR_WITHIN)])
 
-    @staticmethod
-    def eliminate(columns: Array, by_unknown: Array) -> Array:
-        """Project the unknowns of a set-up out of columns, [N, P]."""
-        return project_out(columns, orthonormal_basis(by_unknown))
+    def suppose(self, causes: Causes, factor: float, covariance: Array) -> Hypothesis:
+        rows = np.concatenate([self.blocks[cause] for cause in causes])
+        return Hypothesis.of(causes, factor, rows, covariance)
+
+    def infer(self, deviations: Array | None = None) -> Posterior:
+        """Compute the probabilities of all explanations of readings, [N]."""
+        readings = self.observations.deviations if deviations is None else deviations
+        mean, base, weighted = self.normal.condition(readings)
+        logs = np.array([*(h.log_ratio(mean) for h in self.hypotheses), 0.0]) + self.log_priors
+        for at in np.flatnonzero(logs[:-1] > logs.max() - PROMISING):
+            logs[at] += self._log_outside(self.hypotheses[at], mean)
+        noise = {
+            name: log_sum(
+                np.array([n.condition(readings / d)[1] - np.log(d).sum() - base for n, d in models])
+            )
+            - np.log(2.0 * len(self._disturbed) * len(models) / self.prior_not_geometric)
+            for name, models in self._disturbed.items()
+        }
+        noise["outliers"] = self._log_outliers(weighted) + np.log(self.prior_not_geometric / 2.0)
+        norm = log_sum(np.append(logs, [*noise.values()]))
+        probabilities: dict[Causes, float] = {}
+        for hypothesis, share in zip(self.hypotheses, np.exp(logs - norm), strict=False):
+            present = probabilities.get(hypothesis.causes, 0.0)
+            probabilities[hypothesis.causes] = present + float(share)
+        disturbed = {name: float(np.exp(value - norm)) for name, value in noise.items()}
+        return Posterior(
+            probabilities, float(np.exp(logs[-1] - norm)), disturbed, mean, logs - norm
+        )
+
+    def _log_outside(self, hypothesis: Hypothesis, mean: Array) -> float:
+        """Compute log P(out of tolerance, given the readings) − log P(out of tolerance)."""
+        centre, covariance = hypothesis.moments(self.normal, mean)
+        draws = self._draws[:, : len(centre)]
+        values, vectors = np.linalg.eigh(covariance)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        shares: list[float] = []
+        for coefficients in (centre + draws @ root.T, hypothesis.factor * draws):
+            is_outside, start = np.ones(DRAWS, dtype=bool), 0
+            for shape in (self.causes[cause].shape for cause in hypothesis.causes):
+                stop = start + shape.shape[1]
+                is_outside &= np.abs(coefficients[:, start:stop] @ shape.T).max(axis=1) > 1.0
+                start = stop
+            shares.append(float(is_outside.mean()) + 0.5 / DRAWS)
+        return float(np.log(shares[0] / shares[1]))
 
     @cached_property
-    def hypotheses(self) -> tuple[Hypothesis, ...]:
-        count = range(len(self.causes))
-        sets = [*((cause,) for cause in count), *combinations(count, 2)]
-        return build_hypotheses(self.blocks, self.normal.covariance, sets)
-
-    @cached_property
-    def _log_priors(self) -> Array:
-        """Prior of each hypothesis, and of none, last, [H + 1]."""
-        sizes = [len(hypothesis.causes) for hypothesis in self.hypotheses]
-        priors = {size: np.log(total / max(sizes.count(size), 1))
-                  for size, total in ((1, PRIOR_ONE), (2, PRIOR_TWO))}  # fmt: skip
-        return np.array([*(priors[size] for size in sizes), np.log(PRIOR_WITHIN)])
+    def _draws(self) -> Array:
+        most = 2 * max(len(block) for block in self.blocks)
+        return np.random.default_rng(0).standard_normal((DRAWS, most))
 
     # --- not geometric ----------------------------------------------------------------------------
 
     @cached_property
-    def _disturbed(self) -> list[tuple[str, Normal, Array, float]]:
-        """Models of disturbed files: name, model, divisor of the readings, log of its prior."""
+    def _disturbed(self) -> dict[str, list[tuple[Normal, Array]]]:
+        """Models of more noise in one file, and the factor of its standard uncertainties, [N]."""
         seen = self.observations
-        names = list(dict.fromkeys(seen.sets))
-        models: list[tuple[str, Normal, Array, float]] = []
-        for name in names:
-            inside = np.array([label == name for label in seen.sets])
-            for factor in NOISE_FACTORS:
-                divisor = np.where(inside, np.sqrt(1.0 + (factor * seen.limit) ** 2), 1.0)
-                normal = Normal.of(self._columns / divisor[:, None],
-                                   seen.by_unknown / divisor[:, None])  # fmt: skip
-                share = PRIOR_NOT_GEOMETRIC / 2.0 / len(names) / len(NOISE_FACTORS)
-                models.append((name, normal, divisor, float(np.log(share))))
-        return models
-
-    @cached_property
-    def _bent(self) -> list[tuple[str, Normal, float]]:
-        """Models of bent artefacts: their bends are coefficients like those of causes."""
-        seen = self.observations
-        models: list[tuple[str, Normal, float]] = []
+        models: dict[str, list[tuple[Normal, Array]]] = {}
         for name in dict.fromkeys(seen.sets):
             inside = np.array([label == name for label in seen.sets])
-            bends = seen.bends[:, np.any(seen.bends[inside], axis=0)]
-            for factor in FACTORS if bends.size else ():
-                normal = Normal.of(np.hstack([self._columns, bends * factor / WITHIN]),
-                                   seen.by_unknown)  # fmt: skip
-                models.append(
-                    (name, normal, float(np.log(PRIOR_NOT_GEOMETRIC / 4.0 / len(FACTORS))))
-                )
+            for factor in NOISE_FACTORS:
+                divisor = np.where(inside, np.hypot(1.0, factor * seen.tolerance), 1.0)
+                scaled = (matrix / divisor[:, None] for matrix in (seen.columns, seen.by_unknown))
+                models.setdefault(name, []).append((Normal.of(*scaled), divisor))
         return models
 
-    def _log_outliers(self, deviations: Array, weighted: Array) -> Array:
-        """Compute the log evidence of one to three outliers, the likelier first, [3].
+    def _log_outliers(self, weighted: Array) -> float:
+        """Compute the log evidence of one to three outliers.
 
-        By a reading of variance added to that of r: ½·s²·p²/(1 + s²q) − ½·log(1 + s²q), where
-        p = Σ⁻¹r and q is the diagonal of Σ⁻¹; the mean over the readings, then the same with the
-        likeliest one taken out.
+        A reading of a variance enlarged by s²: ½·s²·p²/(1 + s²q) − ½·log(1 + s²q), p = Σ⁻¹r and q
+        the diagonal of Σ⁻¹; the mean over all readings, and again without the likeliest one.
         """
-        normal, extra = self.normal, (OUTLIER * self.observations.limit) ** 2
-        inner, basis = normal.columns @ normal.covariance, normal.basis
-        q = 1.0 - np.sum(basis**2, axis=1) - np.sum(inner * normal.columns, axis=1)
-        logs, total, weighted = np.zeros(MAX_OUTLIERS), 0.0, weighted.copy()
-        removed: list[tuple[Array, float]] = []  # columns of Σ⁻¹ that were taken out
-        for count in range(MAX_OUTLIERS):
+        normal, variance = self.normal, (OUTLIER * self.observations.tolerance) ** 2
+        inner, p = normal.columns @ normal.covariance, weighted
+        q = 1.0 - np.sum(normal.set_up**2, axis=1) - np.sum(inner * normal.columns, axis=1)
+        removed: list[Array] = []  # scaled columns of Σ⁻¹
+        logs = [0.0]
+        for _ in range(MAX_OUTLIERS):
             q = np.maximum(q, 0.0)
-            gain = 0.5 * extra * weighted**2 / (1.0 + extra * q) - 0.5 * np.log1p(extra * q)
-            total += log_sum(gain) - np.log(len(gain))
-            logs[count] = total
+            gain = 0.5 * variance * p**2 / (1.0 + variance * q) - 0.5 * np.log1p(variance * q)
+            logs.append(logs[-1] + log_sum(gain) - np.log(len(gain)))
             at = int(np.argmax(gain))
-            column = -basis @ basis[at] - inner @ normal.columns[at]
+            column = -normal.set_up @ normal.set_up[at] - inner @ normal.columns[at]
             column[at] += 1.0
-            for vector, factor in removed:
-                column -= factor * vector[at] * vector
-            share = float(extra[at] / (1.0 + extra[at] * q[at]))
-            removed.append((column, share))
-            weighted, q = weighted - share * weighted[at] * column, q - share * column**2
-        return logs
-
-    # --- posterior --------------------------------------------------------------------------------
-
-    def infer(self, deviations: Array | None = None) -> Posterior:
-        """Compute the probabilities for readings of these plans, [N]."""
-        readings = self.observations.deviations if deviations is None else deviations
-        mean, base, weighted = self.normal.condition(readings)
-        weights = np.array([*(h.log_ratio(mean) for h in self.hypotheses), 0.0]) + self._log_priors
-        best = weights.max()
-        for at, hypothesis in enumerate(self.hypotheses):
-            if weights[at] > best - PROMISING:
-                weights[at] += self._log_outside(hypothesis, mean)
-        disturbed: dict[str, list[float]] = {}
-        for name, normal, divisor, log_prior in self._disturbed:
-            _, log_evidence, _ = normal.condition(readings / divisor)
-            log_evidence -= float(np.sum(np.log(divisor)))
-            disturbed.setdefault(name, []).append(log_evidence - base + log_prior)
-        names = list(disturbed)
-        for name, normal, log_prior in self._bent:
-            _, log_evidence, _ = normal.condition(readings)
-            disturbed[name].append(log_evidence - base + log_prior - np.log(len(names)))
-        outliers = self._log_outliers(readings, weighted) + np.log(
-            PRIOR_NOT_GEOMETRIC / 4.0 / MAX_OUTLIERS
-        )
-        disturbed["outliers"] = outliers.tolist()
-        totals = {name: log_sum(np.array(row)) for name, row in disturbed.items()}
-        norm = log_sum(np.append(weights, [*totals.values()]))
-        causes: dict[tuple[int, ...], float] = {}
-        for hypothesis, weight in zip(self.hypotheses, weights, strict=False):
-            share = float(np.exp(weight - norm))
-            causes[hypothesis.causes] = causes.get(hypothesis.causes, 0.0) + share
-        noise = {name: float(np.exp(total - norm)) for name, total in totals.items()}
-        return Posterior(float(np.exp(weights[-1] - norm)), noise, causes, mean, weights - norm)
-
-    def moments(self, hypothesis: Hypothesis, mean: Array) -> tuple[Array, Array]:
-        """Return mean and covariance of the coefficients of a hypothesis under it."""
-        block = self.normal.covariance[np.ix_(hypothesis.rows, hypothesis.rows)]
-        gain = block @ hypothesis.inverse
-        return mean[hypothesis.rows] + gain @ mean[hypothesis.rows], block + gain @ block
-
-    def _log_outside(self, hypothesis: Hypothesis, mean: Array) -> float:
-        """Compute log P(out of tolerance | readings) − log P(out of tolerance)."""
-        centre, covariance = self.moments(hypothesis, mean)
-        normals = self._normals[:, : len(centre)]
-        eigenvalues, vectors = np.linalg.eigh(covariance)
-        root = vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
-        after = self._share_outside(hypothesis, centre + normals @ root.T)
-        before = self._share_outside(hypothesis, normals * np.sqrt(hypothesis.variance))
-        return float(np.log(after) - np.log(before))
-
-    def _share_outside(self, hypothesis: Hypothesis, coefficients: Array) -> float:
-        is_outside = np.ones(len(coefficients), dtype=bool)
-        start = 0
-        for cause in hypothesis.causes:
-            size = len(self.blocks[cause])
-            values = coefficients[:, start : start + size] @ self._relative[cause].T
-            is_outside &= np.abs(values).max(axis=1) > 1.0
-            start += size
-        return (float(is_outside.sum()) + 0.5) / (len(is_outside) + 1.0)
-
-    @cached_property
-    def _relative(self) -> list[Array]:
-        """Values of each cause in half-widths per coefficient, [v, d]."""
-        shapes: list[Array] = []
-        for cause in self.causes:
-            rows = np.isfinite(cause.limit)
-            shapes.append(cause.basis[rows] / cause.limit[rows, None])
-        return shapes
-
-    @cached_property
-    def _normals(self) -> Array:
-        most = 2 * max(len(block) for block in self.blocks)
-        return np.random.default_rng(0).standard_normal((SAMPLES, most))
+            column -= sum(vector[at] * vector for vector in removed)
+            share = variance[at] / (1.0 + variance[at] * q[at])
+            p, q = p - share * p[at] * column, q - share * column**2
+            removed.append(np.sqrt(share) * column)
+        return log_sum(np.array(logs[1:])) - float(np.log(MAX_OUTLIERS))
 
     # --- groups -----------------------------------------------------------------------------------
 
-    def group(
-        self, posterior: Posterior
-    ) -> tuple[list[tuple[tuple[int, ...], ...]], tuple[tuple[int, ...], ...]]:
-        """Group causes that the readings do not separate, each with the likeliest one first.
+    def likeliest(self, causes: Causes, posterior: Posterior) -> Hypothesis:
+        places = [at for at, h in enumerate(self.hypotheses) if h.causes == causes]
+        return self.hypotheses[max(places, key=lambda at: posterior.logs[at])]
 
-        Readings as a cause would produce them, with its likeliest amplitude, are explained by
-        another one: the two are not separated where the evidence differs by less than `SEPARATE`,
-        in both directions. Causes below `RARE` are returned apart.
+    def group(self, posterior: Posterior) -> tuple[list[list[Causes]], list[Causes]]:
+        """Group causes that the readings do not separate, the likeliest first; and rare ones.
+
+        Readings as one cause would produce them are explained by another one where its log evidence
+        is less than `SEPARATE` below; the two are not separated if this holds both ways.
         """
         shares = posterior.causes
         ranked = sorted(shares, key=lambda causes: -shares[causes])
         likely = [causes for causes in ranked if shares[causes] >= RARE]
-        best: dict[tuple[int, ...], tuple[float, Hypothesis]] = {}
-        for weight, hypothesis in zip(posterior.weights, self.hypotheses, strict=False):
-            if weight > best.get(hypothesis.causes, (-np.inf, None))[0]:
-                best[hypothesis.causes] = weight, hypothesis
-        typical = {causes: self._predict(best[causes][1], posterior.mean) for causes in likely}
-
-        def is_explained(causes: tuple[int, ...], other: tuple[int, ...]) -> bool:
-            mean = typical[causes]
-            gain = best[causes][1].log_ratio(mean) - best[other][1].log_ratio(mean)
-            return float(gain) < SEPARATE
-
-        groups: list[list[tuple[int, ...]]] = []
+        best = {causes: self.likeliest(causes, posterior) for causes in likely}
+        means: dict[Causes, Array] = {}
+        readings = self.normal.information - np.eye(len(posterior.mean)) / WITHIN**2
+        for causes, hypothesis in best.items():
+            centre, _ = hypothesis.moments(self.normal, posterior.mean)
+            means[causes] = self.normal.covariance @ (readings[:, hypothesis.rows] @ centre)
+        groups: list[list[Causes]] = []
         for causes in likely:
             for group in groups:
-                if is_explained(group[0], causes) and is_explained(causes, group[0]):
+                both = (group[0], causes), (causes, group[0])
+                gains = [best[a].log_ratio(means[a]) - best[b].log_ratio(means[a]) for a, b in both]
+                if max(gains) < SEPARATE:
                     group.append(causes)
                     break
             else:
                 groups.append([causes])
-        ordered = sorted(groups, key=lambda group: -sum(shares[causes] for causes in group))
-        return [tuple(group) for group in ordered], tuple(ranked[len(likely) :])
-
-    def gained_bits(self, posterior: Posterior) -> float:
-        """Compute the information of the readings on the cause: posterior relative to prior."""
-        logs = posterior.weights - self._log_priors
-        bits = float(np.exp(posterior.weights) @ logs)
-        disturbed = sum(posterior.not_geometric.values())
-        bits += disturbed * np.log(max(disturbed, 1e-300) / PRIOR_NOT_GEOMETRIC)
-        return float(bits / np.log(2.0))
-
-    def fitted_values(self, causes: tuple[int, ...], posterior: Posterior) -> Array:
-        """Compute the variables of causes out of tolerance, their likeliest values, [V]."""
-        places = [at for at, h in enumerate(self.hypotheses) if h.causes == causes]
-        hypothesis = self.hypotheses[max(places, key=lambda at: posterior.weights[at])]
-        centre, _ = self.moments(hypothesis, posterior.mean)
-        basis = np.hstack([self.causes[cause].basis for cause in causes])
-        return basis @ centre
-
-    def _predict(self, hypothesis: Hypothesis, mean: Array) -> Array:
-        """Return the mean of all coefficients that readings of the fitted cause would produce."""
-        centre, _ = self.moments(hypothesis, mean)
-        return self.normal.covariance @ (self.normal.information[:, hypothesis.rows] @ centre)
+        groups.sort(key=lambda group: -sum(shares[causes] for causes in group))
+        return groups, ranked[len(likely) :]
 
 
 def log_sum(logs: Array) -> float:

@@ -345,7 +345,7 @@ class DiagnoseTexts(Diagnose):
             parse_readings(file.content, file.name, scene, file.kind, self.frame)
             for file in self.files
         ]
-        return self.diagnose_readings(scene, reading_sets, watch)
+        return self.diagnose(reading_sets, scene, watch)
 
 
 class DiagnosePanel(CalibratePanel):

@@ -258,9 +258,10 @@ class PagePanel(Panel):
 # --- The tasks, and all panels --------------------------------------------------------------------
 
 PANELS: dict[str, type[AnalysisPanel]] = {
-    "calibrate": CalibratePanel, "diagnose": DiagnosePanel, "adjust": AdjustPanel, "compensate": CompensatePanel,
+    "calibrate": CalibratePanel, "adjust": AdjustPanel, "compensate": CompensatePanel,
     "allocate": TolerancesPanel, "concepts": ConceptsPanel, "distance": DistancePanel,
     "part": PartPanel, "program": ProgramPanel, "acceptance": AcceptancePanel,
+    "diagnose": DiagnosePanel,
 }  # fmt: skip
 """Panels with features beyond the description of the analysis, by name of the analysis."""
 FIRST = ("compensate", "concepts", "allocate")  # sections at the top of their task
