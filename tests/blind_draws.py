@@ -7,7 +7,6 @@ cause out of tolerance three or eight half-widths, and exceeds the half-width so
 """
 
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -161,7 +160,7 @@ def names_of(scene):
     linear = [axis for axis in axes if axis[0] in LINEAR]
     names = [key for key in scene.parameter_keys if half_width(scene, key)]
     names += [f"reversal of {axis}" for axis in axes]
-    names += [f"servo mismatch {a}{b}" for a, b in combinations(linear, 2)]
+    names += [f"servo mismatch of {axis}" for axis in linear]
     return [*names, "bent plate", "scale temperature"]
 
 
@@ -197,10 +196,8 @@ def add_cause(machine, name, factor, rng):
             bends = factor * rng.standard_normal(3)
         machine.bends = smallest_um(scene) * bends
     elif name.startswith("servo"):
-        first, second = name.rpartition(" ")[2]
-        size = min(half_width(scene, along(first)), half_width(scene, along(second))) * scalar()
-        for axis, sign in ((first, 0.5), (second, -0.5)):
-            machine.lag[axis] = machine.lag.get(axis, 0.0) + sign * size
+        axis = name.rpartition(" ")[2]
+        machine.lag[axis] = half_width(scene, along(axis)) * scalar()
     else:
         spans = {axis: scene.axis_span(axis) for axis in linear}
         longest = max(high - low for low, high in spans.values()) / 2.0

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
 
 import numpy as np
 
@@ -58,18 +57,12 @@ class CauseSet:
         return tuple(filter(is_linear, self.scene.machine.axes))
 
     @cached_property
-    def planes(self) -> tuple[tuple[str, str], ...]:
-        """Pairs of linear axes along different directions."""
-        pairs = combinations(self.linear_axes, 2)
-        return tuple((a, b) for a, b in pairs if direction_index(a) != direction_index(b))
-
-    @cached_property
     def variables(self) -> list[str]:
         """Error of each knot, reversals, mismatches, bends, (V,)."""
         return [
             *(key for key, _ in self.curves.variables),
             *(f"reversal of {axis}" for axis in self.scene.machine.axes),
-            *(f"servo mismatch {first}{second}" for first, second in self.planes),
+            *(f"servo mismatch of {axis}" for axis in self.linear_axes),
             *[BENT] * PLATE_BENDS,
         ]
 
@@ -97,9 +90,9 @@ class CauseSet:
         for axis in axes:
             name = f"reversal of {axis}"
             yield self._cause(name, [name], position[axis], np.eye(1))
-        for pair in self.planes:
-            name = f"servo mismatch {''.join(pair)}"
-            yield self._cause(name, [name], min(position[axis] for axis in pair), np.eye(1))
+        for axis in self.linear_axes:
+            name = f"servo mismatch of {axis}"
+            yield self._cause(name, [name], position[axis], np.eye(1))
         yield self._cause(BENT, [BENT], self.smallest_um, np.eye(PLATE_BENDS))
         if self.linear_axes:
             spans = [self.scene.axis_span(axis) for axis in self.linear_axes]
@@ -151,21 +144,21 @@ class CauseSet:
         return np.hstack([by_error, 0.5 * by_reversal, others]), by_unknown
 
     def _respond_test(self, readings: Readings) -> Array:
-        """Differentiate circles by mismatches, and plates by bends, [n, pairs + 3].
+        """Differentiate circles by mismatches, and plates by bends, [n, axes + 3].
 
-        A mismatch is the lag of the first axis minus that of the second at the feed of a circle.
+        A mismatch is the lag of one axis, more than that of the others, at the feed of a circle.
         """
         kind, plan = find_kind(readings.kind), readings.plan
-        matrix = np.zeros((readings.observed_mm.size, len(self.planes) + PLATE_BENDS))
+        matrix = np.zeros((readings.observed_mm.size, len(self.linear_axes) + PLATE_BENDS))
         test = kind.test if isinstance(kind, TestReadings) else None
         if plan is not None and isinstance(test, Circular):
             scene = replace(self.scene, errors=ErrorSet(), model=test.model(self.scene))
-            for column, pair in enumerate(self.planes):
-                sites = respond_sites(scene, plan, [positioning_key(axis) for axis in pair])
-                for axis, site, share in zip(pair, sites, (0.5, -0.5), strict=True):
-                    direction = share * self.scene.machine.axes[axis].direction
-                    feed = direction * plan.travel.get(axis, np.zeros(len(site)))
-                    matrix[:, column] += sense(plan, feed[:, None] * site) * MM_PER_UM
+            keys = [positioning_key(axis) for axis in self.linear_axes]
+            sites = respond_sites(scene, plan, keys)
+            for column, axis in enumerate(self.linear_axes):
+                if axis in plan.travel:
+                    feed = self.scene.machine.axes[axis].direction * plan.travel[axis]
+                    matrix[:, column] = sense(plan, feed[:, None] * sites[column]) * MM_PER_UM
         elif plan is not None and isinstance(test, BallPlate):
             row, column = (
                 2.0 * plan.marks[name] / (test.balls - 1) - 1.0 for name in ("row", "column")
@@ -173,7 +166,7 @@ class CauseSet:
             across = 3 - sum("XYZ".index(axis) for axis in test.plane)
             sensed = np.repeat(np.arange(3), len(row) // 3) == across
             bends = np.stack([row**2, row * column, column**2], -1)
-            matrix[:, len(self.planes) :] = sensed[:, None] * bends * MM_PER_UM
+            matrix[:, len(self.linear_axes) :] = sensed[:, None] * bends * MM_PER_UM
         return matrix
 
 

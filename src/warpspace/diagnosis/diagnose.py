@@ -10,7 +10,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table
 from warpspace.analysis.description import NO_JSON, Analysis, ProgressCallback, Result
-from warpspace.analysis.options import Files, Grammar, option, typed_word
+from warpspace.analysis.options import Files, Grammar, option, place_words, typed_word
 from warpspace.calibration.next_best import candidates
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import read_readings
@@ -37,6 +37,7 @@ from warpspace.units import MM_PER_UM
 
 MAX_NEXT, MAX_SYMPTOMS = 10, 8
 EXPLAINED, LISTED = 3, 0.01  # causes that are explained, and probability of one that is listed
+LEAST_UM = 0.1  # effect that is stated
 NAMED = 8  # causes of a group that are named
 NEGLIGIBLE = 1e-6  # reading per half-width, in standard uncertainties
 MANY = 3  # causes of a group that readings should separate before an adjustment
@@ -219,7 +220,8 @@ class Diagnosis(Result):
                 more = len(entry.alone) - NAMED
                 names = ", ".join(entry.alone[:NAMED]) + f" and {more} more" * (more > 0)
                 yield f"  not separated from {names}"
-            yield f"  effect: {entry.effect}"
+            if entry.effect:
+                yield f"  effect: {entry.effect}"
             if entry.confirm is not None:
                 yield f"  confirm: {entry.confirm.test}, {entry.confirm.minutes:.0f} min"
             yield f"  remedy: {entry.remedy}"
@@ -295,19 +297,19 @@ class Explanations:
     def _describe_effect(self, members: Causes) -> str:
         hypothesis = self.diagnostics.likeliest(members, self.posterior)
         centre, _ = hypothesis.moments(self.diagnostics.normal, self.posterior.mean)
-        curves, at = self.set.curves, 0
+        curves = self.set.curves
         values = self.set.basis[:, hypothesis.rows] @ centre
         error_um = curves.gains @ values[: len(curves.variables)]
         at = int(np.argmax(np.linalg.norm(error_um, axis=1)))
-        parts = zip("xyz", error_um[at], strict=True)
-        shape = curves.grid.shape
-        place = ", ".join(
-            f"{axis} {float(np.broadcast_to(q, shape).flat[at]):g}"
-            for axis, q in curves.grid.coordinates.items()
-            if axis in self.set.linear_axes
-        )
-        largest = " ".join(f"{letter} {value:+.1f}" for letter, value in parts)
-        return f"up to {largest} µm in the volume, at {place}"
+        largest_um = float(np.linalg.norm(error_um[at]))
+        if largest_um < LEAST_UM:
+            return ""
+        place = {
+            axis: float(np.broadcast_to(positions, curves.grid.shape).flat[at])
+            for axis, positions in curves.grid.coordinates.items()
+            if axis in self.set.scene.workspace.volume_axes
+        }
+        return f"up to {largest_um:.1f} µm in the volume, at {place_words(place)}"
 
 
 def load_remedies() -> Mapping[str, tuple[str, str]]:
