@@ -30,20 +30,20 @@ class HiddenMachine:
         self.errors[key] = self.errors.get(key, 0.0) + np.asarray(values, float)
 
     def errors_um(self, at, travel):
-        """Errors actual − nominal of the tool on the workpiece, in R, [n, 3]."""
+        """Tool point minus the workpiece point that nominally coincides with it, in R, [n, 3]."""
         tool = self.scene.machine.chain.tool
         table = self.scene.machine.chain.workpiece
-        poses = {}
+        tip = np.array(self.scene.model.tool_point_mm)
+        for name in ("t", "S"):
+            tip = tip + np.array(self.scene.machine.fixed_mm.get(name, (0.0, 0.0, 0.0)))
+        point, carried = {}, {}
         for actual in (True, False):
-            tip = np.array(self.scene.model.tool_point_mm)
-            for name in ("t", "S"):
-                tip = tip + np.array(self.scene.machine.fixed_mm.get(name, (0.0, 0.0, 0.0)))
-            carried = self.branch(table, at, travel, actual)
-            point = (self.branch(tool, at, travel, actual) @ np.append(tip, 1.0))[..., None]
-            poses[actual] = (np.linalg.inv(carried) @ point)[:, :3, 0], carried[:, :3, :3]
-        (actual, _), (nominal, turn) = poses[True], poses[False]
-        self.nominal_mm = nominal
-        return np.einsum("nij,nj->ni", turn, actual - nominal) * 1e3
+            point[actual] = self.branch(tool, at, travel, actual) @ np.append(tip, 1.0)
+            carried[actual] = self.branch(table, at, travel, actual)
+        nominal = (np.linalg.inv(carried[False]) @ point[False][..., None])[..., 0]
+        self.nominal_mm = nominal[:, :3]
+        coincident = np.einsum("nij,nj->ni", carried[True], nominal)
+        return (point[True] - coincident)[:, :3] * 1e3
 
     def branch(self, names, at, travel, actual):
         count = max(np.size(values) for values in at.values())
@@ -164,16 +164,17 @@ def names_of(scene):
     return [*names, "bent plate", "scale temperature"]
 
 
-def add_cause(machine, name, factor, rng):
+def add_cause(machine, name, factor, rng, exactly=0.0):
     """Draw an error with a standard deviation in half-widths; out of tolerance if above one."""
     scene, axes = machine.scene, machine.scene.machine.axes
     linear = [axis for axis in axes if axis[0] in LINEAR]
 
     def scalar():
-        while True:
+        while not exactly:
             value = factor * rng.standard_normal()
             if factor < 1.0 or abs(value) > 1.0:
                 return value
+        return exactly * rng.choice([-1.0, 1.0])
 
     if name.startswith("E"):
         width = half_width(scene, name)
@@ -192,6 +193,7 @@ def add_cause(machine, name, factor, rng):
         machine.reversal[axis] = half_width(scene, key) * scalar()
     elif name == "bent plate":
         bends = factor * rng.standard_normal(3)
+        bends *= exactly / np.abs(bends).max() if exactly else 1.0
         while factor > 1.0 and np.abs(bends).max() <= 1.0:
             bends = factor * rng.standard_normal(3)
         machine.bends = smallest_um(scene) * bends
@@ -207,15 +209,21 @@ def add_cause(machine, name, factor, rng):
             machine.add(along(axis), axes[axis].direction * size * grown)
 
 
-def draw(scene, rng):
-    """Draw a machine and the truth: names of causes, "within", or "not geometric" and how."""
+def draw(scene, rng, planted=None):
+    """Draw a machine and the truth: names of causes, and "within", "causes" or "disturbed".
+
+    A planted cause has a coefficient of four half-widths.
+    """
     machine, names = HiddenMachine(scene), names_of(scene)
-    kind = rng.choice(4, p=[0.2, 0.58, 0.1, 0.12])
+    kind = 1 if planted else rng.choice(4, p=[0.2, 0.58, 0.1, 0.12])
     count = [0, 1, 2, 0][kind]
     causes = [names[at] for at in rng.choice(len(names), count, replace=False)]
+    causes = [planted] if planted else causes
     factor = rng.choice([3.0, 8.0])
     for name in names:
-        add_cause(machine, name, factor if name in causes else 0.5, rng)
+        add_cause(
+            machine, name, factor if name in causes else 0.5, rng, exactly=4.0 * (name == planted)
+        )
     return machine, frozenset(causes), ["within", "causes", "causes", "disturbed"][kind]
 
 

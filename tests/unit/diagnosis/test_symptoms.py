@@ -128,7 +128,7 @@ def test_other_texts_are_refused(scene, text, message):
 
 def test_contradictory_symptoms_are_named(scene):
     texts = tuple(f"circle of 100 mm oval by {size} µm at 45°" for size in (60, 10))
-    with pytest.raises(OptionError, match="60 µm.*and.*10 µm.*contradict"):
+    with pytest.raises(OptionError, match=r"60 µm.*and.*10 µm.*contradict"):
         Diagnose(symptoms=(*texts, "step of 20 µm where Y reverses")).run(scene, lambda _: None)
     with pytest.raises(OptionError, match="no readings, no symptoms"):
         Diagnose().run(scene, lambda _: None)
@@ -137,7 +137,7 @@ def test_contradictory_symptoms_are_named(scene):
 def test_a_scene_without_tolerances_is_refused(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(SCENE.partition("[tolerances]")[0], "utf-8")
-    with pytest.raises(OptionError, match="EXX.*have no tolerance"):
+    with pytest.raises(OptionError, match=r"EXX.*have no tolerance"):
         Diagnose(symptoms=("step of 20 µm where Y reverses",)).run(
             load_scene(str(path)), lambda _: None
         )
