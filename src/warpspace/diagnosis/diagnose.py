@@ -140,7 +140,7 @@ class Diagnose(Analysis):
         if symptoms:
             notes.append(f"standard uncertainty of a symptom: {SYMPTOM_SHARE:.0%} of its amount")
         if any(readings.sigma_mm is None for readings in sets):
-            notes.append(f"standard uncertainty of a reading: {self.noise_um:g} µm ({{noise_um}})")
+            notes.append(f"standard uncertainty of a reading: {self.noise_um:g} µm")
         zero = [key for key in causes.curves.keys if not causes.half_width(key)]
         notes += [f"{', '.join(zero)}: tolerance 0, no causes"] if zero else []
         return Diagnosis(
@@ -236,10 +236,10 @@ class Diagnosis(Result):
             [(test.test, test.information_bits, test.minutes) for test in self.next],
             empty="No check separates the causes further.",
         )
+        yield from (f"  {note}" for note in self.notes)
 
     def caveats(self) -> Iterator[str]:
         yield from super().caveats()
-        yield from self.notes
         first = max(self.causes, key=lambda entry: entry.probability)
         count = len(first.alone) + 1
         if self.gained_bits < MIN_GAIN_BITS:

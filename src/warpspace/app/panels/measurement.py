@@ -35,6 +35,7 @@ from warpspace.calibration.calibration_result import Calibration
 from warpspace.calibration.readings import bundled_data, find_data, parse_reading_table
 from warpspace.calibration.registry import KINDS, parse_readings
 from warpspace.diagnosis.diagnose import Diagnose, Diagnosis
+from warpspace.diagnosis.symptoms import FORMS
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import decode_text
@@ -325,44 +326,41 @@ def _kind_words(kind: str) -> str:
 
 
 def _split_symptoms(text: str, _scene: Scene) -> tuple[str, ...]:
-    return tuple(part.strip() for part in text.split(";") if part.strip())
+    return tuple(filter(None, (part.strip() for part in text.split(";"))))
 
 
 @dataclass(frozen=True, kw_only=True)
 class DiagnoseTexts(Diagnose):
-    symptoms: Annotated[tuple[str, ...], Grammar("TEXT", _split_symptoms)] = option(
-        (),
-        "circle of 100 mm oval by 30 µm at 45°, same in both directions; plate of 300 x 200 mm"
-        " diagonals differ by 0.2 mm; taper 0.03 on 300; step of 20 µm where Y reverses."
-        " Several are separated by semicolons",
-        flag="--symptom",
-        label="Symptoms",
+    symptoms: Annotated[tuple[str, ...], Grammar("TEXT; TEXT", _split_symptoms)] = option(
+        (), f"Symptoms, separated by semicolons: {', or '.join(FORMS)}"
     )
     files: tuple[UploadedFile, ...] = ()
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> Diagnosis:
-        reading_sets = [
-            parse_readings(file.content, file.name, scene, file.kind, self.frame)
-            for file in self.files
-        ]
-        return self.diagnose(reading_sets, scene, watch)
+        parsed = (parse_readings(f.content, f.name, scene, f.kind) for f in self.files)
+        return self.diagnose(list(parsed), scene, watch)
 
 
-class DiagnosePanel(CalibratePanel):
-    """Uploaded readings and typed symptoms, and the causes that explain them."""
+class DiagnosePanel(FilesPanel):
+    """Uploaded readings and typed symptoms, and their causes."""
 
     own_kind = DiagnoseTexts
-    sentence = "The likeliest causes of readings or symptoms, and the checks that confirm them"
+    sentence = "The likeliest causes of readings and symptoms, and how to confirm them"
     run_label = "Diagnose"
 
-    def defaults(self, state: AppState) -> Mapping[str, str]:
-        return AnalysisPanel.defaults(self, state)
-
     def is_ready(self, state: AppState) -> bool:
-        return bool(self.files) or bool(self.values(state).get("symptoms", "").strip())
+        return bool(self.files or self.values(state).get("symptoms"))
 
-    def headline(self, result: Result) -> Markup:
-        return AnalysisPanel.headline(self, result)
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        return {"files": self.files}
 
-    def result_html(self, result: Result) -> Markup:
-        return AnalysisPanel.result_html(self, result)
+    def before_result(self, state: AppState) -> Markup:
+        return join((self.files_html(), HTML.upload("Add readings …", self.name, MOST_BYTES)))
+
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
+        """Parse a file; its kind is that stated at its place, or the last one."""
+        kinds = self.values(self.context.state).get("kinds", "").split()
+        kind = kinds[min(len(self.files), len(kinds) - 1)] if kinds else None
+        text, _ = decode_text(content, name)
+        scene, files = self.context.state.active_scene(), self.files
+        return partial(self.set_files, (*files, read_uploaded(scene, text, name, kind, files)))
