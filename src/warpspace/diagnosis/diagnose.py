@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -315,8 +315,7 @@ class Explanations:
 def load_remedies() -> Mapping[str, tuple[str, str]]:
     """Read element and remedy of each class of causes, with the source."""
     path = assets_dir() / "remedies.toml"
-    document = parse_toml(read_text(path, MAX_SCENE_BYTES), str(path))
+    rows: dict[str, Any] = dict(parse_toml(read_text(path, MAX_SCENE_BYTES), str(path)))
     return {
-        name: (row["element"], f"{row['remedy']} ({row['source']})")
-        for name, row in document.items()
+        name: (row["element"], f"{row['remedy']} ({row['source']})") for name, row in rows.items()
     }

@@ -78,7 +78,8 @@ class Normal:
         volume = np.linalg.slogdet(information)[1] + 2.0 * size * np.log(WITHIN)
         if set_up.size:  # flat prior
             volume += np.linalg.slogdet(set_up.T @ by_unknown @ by_unknown.T @ set_up)[1]
-        return cls(columns, set_up, information, np.linalg.inv(information), -0.5 * float(volume))
+        covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
+        return cls(columns, set_up, information, covariance, -0.5 * float(volume))
 
     def condition(self, deviations: Array) -> tuple[Array, float, Array]:
         """Return mean, [P], log evidence, and readings weighted by their covariance, [N]."""
@@ -105,7 +106,8 @@ class Hypothesis:
         loss = 1.0 / WITHIN**2 - 1.0 / factor**2
         kernel = np.eye(len(rows)) / loss - covariance[np.ix_(rows, rows)]
         volume = np.linalg.slogdet(kernel)[1] + len(rows) * np.log(loss * (factor / WITHIN) ** 2)
-        return cls(causes, factor, rows, np.linalg.inv(kernel), -0.5 * float(volume))
+        inverse = np.asarray(np.linalg.inv(kernel), dtype=np.float64)
+        return cls(causes, factor, rows, inverse, -0.5 * float(volume))
 
     def log_ratio(self, means: Array) -> Array:
         """Compute the log evidence relative to all causes within tolerance, [...]."""

@@ -69,7 +69,7 @@ def rank_tests(
         watch(number / len(planned))
         columns = Normal.of(added.columns, added.by_unknown).columns
         gram = columns.T @ columns
-        covariance = np.linalg.inv(normal.information + gram)
+        covariance = np.asarray(np.linalg.inv(normal.information + gram), dtype=np.float64)
         noise = rng.standard_normal((DRAWS, len(columns))) @ columns
         means = (normal.information @ posterior.mean + coefficients @ gram + noise) @ covariance
         later = [

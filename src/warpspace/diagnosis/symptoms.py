@@ -46,8 +46,11 @@ FORMS = {
     ),
 }
 """Patterns of symptoms by an example with the same first word."""
-WORDS = set(re.findall(r"[^\W\d_]+", " ".join(FORMS).lower()))
-WORDS |= {"um", "in", "opposite", "deg", "xy", "xz", "yz", *"xyzuvw"}
+WORDS = {
+    *re.findall(r"[^\W\d_]+", " ".join(FORMS).lower()),
+    *("um", "in", "opposite", "deg", "xy", "xz", "yz"),
+    *"xyzuvw",
+}
 
 
 def observe(causes: CauseSet, model: MeasurementModel, noise_mm: float) -> Observations:
@@ -139,7 +142,8 @@ def _build_circle(scene: Scene, amount_um: float, words: re.Match[str]) -> Sympt
     values, zero = np.array([wave.real, wave.imag]), np.zeros(2)
     rows = {None: (values,), "same": (values, zero), "opposite": (zero, values)}
     values_um = np.concatenate(rows[words["directions"]])
-    weights = np.linalg.pinv(np.stack(design, -1))[3 : 3 + len(values_um)]
+    inverse = np.asarray(np.linalg.pinv(np.stack(design, -1)), dtype=np.float64)
+    weights = inverse[3 : 3 + len(values_um)]
     assumed = f"{plane}, about {place_words(scene.workspace.positions)}; largest diameter minus"
     return Symptom(readings, weights, values_um, f"{assumed} smallest")
 

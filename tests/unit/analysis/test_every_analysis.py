@@ -55,8 +55,8 @@ NEEDED = {
     "calibrate": ("fork_head_bc", {"data": ("tcp_on.csv",)}, ["--data", "tcp_on.csv"]),
     "diagnose": (
         "dvf5000_general",
-        {"symptoms": ("step of 20 µm where Y reverses",)},
-        ["--symptom", "step of 20 µm where Y reverses"],
+        {"symptoms": ("step of 60 µm where Y reverses",)},
+        ["--symptom", "step of 60 µm where Y reverses"],
     ),
     "clamp": ("dvf5000_first", {"file": PLATE, "place": (0, 0, 50)}, [PLATE, "--place", "0,0,50"]),
     "part": ("dvf5000_first", {"file": PLATE}, [PLATE]),
