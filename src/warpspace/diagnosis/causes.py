@@ -136,17 +136,17 @@ class CauseSet:
         unit: dict[str, ErrorFunction] = {}
         for axis in self.scene.machine.axes:
             span = self.scene.axis_span(axis)
-            both = Directional(span, Constant(span, 0.5), Constant(span, -0.5))
-            unit[positioning_key(axis)] = both
+            reversal = Directional(span, Constant(span, 0.5), Constant(span, -0.5))
+            unit[positioning_key(axis)] = reversal
         by_error = self.curves.respond(lambda scene: differentiate(model, scene.errors, 1.0)[0])
         by_reversal, by_unknown = differentiate(model, ErrorSet(unit), 0.5)
-        others = np.concatenate([self._respond_test(readings) for readings in model.sets])
-        return np.hstack([by_error, 0.5 * by_reversal, others]), by_unknown
+        by_test = np.concatenate([self._respond_test(readings) for readings in model.sets])
+        return np.hstack([by_error, 0.5 * by_reversal, by_test]), by_unknown
 
     def _respond_test(self, readings: Readings) -> Array:
         """Differentiate circles by mismatches, and plates by bends, [n, axes + 3].
 
-        A mismatch is the lag of one axis, more than that of the others, at the feed of a circle.
+        A mismatch is the lag of one axis, more than that of the by_test, at the feed of a circle.
         """
         kind, plan = find_kind(readings.kind), readings.plan
         matrix = np.zeros((readings.observed_mm.size, len(self.linear_axes) + PLATE_BENDS))

@@ -171,7 +171,7 @@ class CauseGroup:
     summary: str = field(default="", metadata=NO_JSON)  # of causes that are not listed by name
 
     @property
-    def alone(self) -> list[str]:
+    def single_causes(self) -> list[str]:
         """The other causes that explain the readings alone."""
         return [causes[0] for causes in self.group if len(causes) == 1]
 
@@ -197,10 +197,10 @@ class Diagnosis(Result):
         yield f"{self.title} · {'; '.join(self.sources)}"
         rows: list[tuple[str, float, str]] = []
         for entry in self.causes:
-            more = f" or {len(entry.alone)} more" if entry.alone else ""
+            count = len(entry.single_causes)
             element = "" if entry.summary else entry.element
             if entry.probability >= LISTED:
-                name = entry.summary or entry.title + more
+                name = entry.summary or entry.title + f" or {count} more" * (count > 0)
                 rows.append((name, 100.0 * entry.probability, element))
         rows.append(("not geometric", 100.0 * self.not_geometric, self.disturbed))
         rows.append(("all errors within tolerance", 100.0 * self.within_tolerance, ""))
@@ -216,9 +216,9 @@ class Diagnosis(Result):
             if entry.summary or entry.probability < LISTED:
                 continue
             yield f"{entry.title}: {100.0 * entry.probability:.0f} %"
-            if entry.alone:
-                more = len(entry.alone) - NAMED
-                names = ", ".join(entry.alone[:NAMED]) + f" and {more} more" * (more > 0)
+            if entry.single_causes:
+                rest = len(entry.single_causes) - NAMED
+                names = ", ".join(entry.single_causes[:NAMED]) + f" and {rest} more" * (rest > 0)
                 yield f"  not separated from {names}"
             if entry.effect:
                 yield f"  effect: {entry.effect}"
@@ -241,7 +241,7 @@ class Diagnosis(Result):
     def caveats(self) -> Iterator[str]:
         yield from super().caveats()
         first = max(self.causes, key=lambda entry: entry.probability)
-        count = len(first.alone) + 1
+        count = len(first.single_causes) + 1
         if self.gained_bits < MIN_GAIN_BITS:
             yield "the readings reveal no cause: the probabilities are those before the readings"
         elif count > MANY:

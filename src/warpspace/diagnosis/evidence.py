@@ -155,11 +155,9 @@ class Diagnostics:
             for factor in FACTORS
         ]
         pairs = len(causes) * (len(causes) - 1) / 2.0
-        one, two = (
-            np.log(p / len(FACTORS)) for p in (PRIOR_ONE / len(causes), PRIOR_TWO / max(pairs, 1.0))
-        )
-        priors = [one if len(h.causes) == 1 else two for h in self.hypotheses]
-        self.log_priors = np.array([*priors, np.log(PRIOR_WITHIN)])
+        priors = {1: PRIOR_ONE / len(causes), 2: PRIOR_TWO / max(pairs, 1.0)}
+        logs = [np.log(priors[len(h.causes)] / len(FACTORS)) for h in self.hypotheses]
+        self.log_priors = np.array([*logs, np.log(PRIOR_WITHIN)])
 
     def suppose(self, causes: Causes, factor: float, covariance: Array) -> Hypothesis:
         rows = np.concatenate([self.blocks[cause] for cause in causes])
@@ -208,21 +206,24 @@ class Diagnostics:
 
     @cached_property
     def _draws(self) -> Array:
-        most = 2 * max(len(block) for block in self.blocks)
-        return np.random.default_rng(0).standard_normal((DRAWS, most))
+        width = 2 * max(len(block) for block in self.blocks)
+        return np.random.default_rng(0).standard_normal((DRAWS, width))
 
     # --- not geometric ----------------------------------------------------------------------------
 
     @cached_property
     def _disturbed(self) -> dict[str, list[tuple[Normal, Array]]]:
         """Models of more noise in one file, and the factor of its standard uncertainties, [N]."""
-        seen = self.observations
+        observations = self.observations
         models: dict[str, list[tuple[Normal, Array]]] = {}
-        for name in dict.fromkeys(seen.sets):
-            inside = np.array([label == name for label in seen.sets])
+        for name in dict.fromkeys(observations.sets):
+            inside = np.array([label == name for label in observations.sets])
             for factor in NOISE_FACTORS:
-                divisor = np.where(inside, np.hypot(1.0, factor * seen.tolerance), 1.0)
-                scaled = (matrix / divisor[:, None] for matrix in (seen.columns, seen.by_unknown))
+                divisor = np.where(inside, np.hypot(1.0, factor * observations.tolerance), 1.0)
+                scaled = (
+                    matrix / divisor[:, None]
+                    for matrix in (observations.columns, observations.by_unknown)
+                )
                 models.setdefault(name, []).append((Normal.of(*scaled), divisor))
         return models
 
@@ -274,8 +275,10 @@ class Diagnostics:
         groups: list[list[Causes]] = []
         for causes in likely:
             for group in groups:
-                both = (group[0], causes), (causes, group[0])
-                gains = [best[a].log_ratio(means[a]) - best[b].log_ratio(means[a]) for a, b in both]
+                directions = (group[0], causes), (causes, group[0])
+                gains = [
+                    best[a].log_ratio(means[a]) - best[b].log_ratio(means[a]) for a, b in directions
+                ]
                 if max(gains) < SEPARATE:
                     group.append(causes)
                     break
