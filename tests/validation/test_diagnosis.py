@@ -49,7 +49,7 @@ class Measured:
         self.names = [cause.name for cause in self.set.causes]
 
     def observe(self, sets):
-        return observe(self.set, MeasurementModel.of(self.scene, sets), 1e-3)
+        return observe(self.set, sets, 1e-3)
 
 
 measured_on = cache(Measured)
@@ -216,8 +216,8 @@ def test_a_thousand_machines_are_diagnosed(name):
         assert is_true >= 0.95
         for label in ("1 causes", "2 causes", "within", "noise", "outliers"):
             rank = np.array(ranks[label, checks])
-            print(f"{name}, {checks} checks: {len(rank)} of {label}: first {np.mean(rank == 0):.3f},"
-                  f" among three {np.mean(rank < 3):.3f}")  # fmt: skip
+            figures = f"first {np.mean(rank == 0):.3f}, among three {np.mean(rank < 3):.3f}"
+            print(f"{name}, {checks} checks: {len(rank)} of {label}: {figures}")
     assert within_three(ranks["1 causes", CHECKS]) >= 0.95
     disturbed = np.array([*ranks["noise", 0], *ranks["outliers", 0]])
     assert np.mean(disturbed == 0) >= 0.9

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial, reduce
+from functools import cache, partial, reduce
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -14,7 +14,6 @@ from warpspace.analysis.options import Files, Grammar, option, place_words, type
 from warpspace.calibration.next_best import candidates
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import read_readings
-from warpspace.calibration.solve import MeasurementModel
 from warpspace.diagnosis.causes import CauseSet
 from warpspace.diagnosis.evidence import (
     PRIOR_NOT_GEOMETRIC,
@@ -35,7 +34,7 @@ from warpspace.scene.model import Scene
 from warpspace.scene.text_files import parse_toml, read_text
 from warpspace.units import MM_PER_UM
 
-MAX_NEXT, MAX_SYMPTOMS = 10, 8
+MAX_NEXT, MAX_SETS = 10, 12  # checks; files and symptoms, each
 EXPLAINED, LISTED = 3, 0.01  # causes that are explained, and probability of one that is listed
 LEAST_UM = 0.1  # effect that is stated
 NAMED = 8  # causes of a group that are named
@@ -89,10 +88,9 @@ class Diagnose(Analysis):
         kinds = self.kinds if len(self.kinds) > 1 else (self.kinds or (None,)) * count
         if len(kinds) != count:
             raise OptionError(f"{len(kinds)} values of {{kinds}}; expected 1 or {count}")
-        files = zip(self.data, kinds, strict=True)
-        return self.diagnose(
-            [read_readings(*file[:1], scene, file[1]) for file in files], scene, watch
-        )
+        pairs = zip(self.data, kinds, strict=True)
+        sets = [read_readings(name, scene, kind) for name, kind in pairs]
+        return self.diagnose(sets, scene, watch)
 
     def diagnose(
         self, sets: Sequence[Readings], scene: Scene, watch: ProgressCallback
@@ -100,8 +98,9 @@ class Diagnose(Analysis):
         """Rank the causes of readings and of the symptoms."""
         if not sets and not self.symptoms:
             raise OptionError("no readings, no symptoms; expected {data} FILE or {symptoms} TEXT")
-        if len(self.symptoms) > MAX_SYMPTOMS:
-            raise OptionError(f"{len(self.symptoms)} {{symptoms}}; expected at most {MAX_SYMPTOMS}")
+        for name, count in (("data", len(sets)), ("symptoms", len(self.symptoms))):
+            if count > MAX_SETS:
+                raise OptionError(f"{count} values of {{{name}}}; expected at most {MAX_SETS}")
         causes, noise_mm = CauseSet(scene), self.noise_um * MM_PER_UM
         symptoms = [read_symptom(text, scene) for text in self.symptoms]
         parts = [symptom.observe(causes) for symptom in symptoms]
@@ -109,25 +108,15 @@ class Diagnose(Analysis):
             check_symptoms(reduce(Observations.joined, parts))
         if sets:
             named = [replace(readings, source=Path(readings.source).name) for readings in sets]
-            model = MeasurementModel.of(scene, named, partial(watch, 0.0))
-            parts.append(observe(causes, model, noise_mm))
+            parts.append(observe(causes, named, noise_mm, partial(watch, 0.0)))
         prior = PRIOR_NOT_GEOMETRIC if sets else PRIOR_SYMPTOM_WRONG
         observations = reduce(Observations.joined, parts)
-        diagnostics = Diagnostics(causes.causes, observations, prior)
-        watch(0.3)
+        diagnostics = Diagnostics(causes.causes, observations, prior, partial(watch, 0.2))
         posterior = diagnostics.infer()
         groups, rare = diagnostics.group(posterior)
-        planned = candidates(scene)
         checks = [
-            (
-                check,
-                observe(
-                    causes,
-                    MeasurementModel.of(scene, [check.readings], partial(watch, 0.5)),
-                    noise_mm,
-                ),
-            )
-            for check in planned
+            (check, observe(causes, [check.readings], noise_mm, partial(watch, 0.5)))
+            for check in candidates(scene)
         ]
         tests = rank_tests(diagnostics, posterior, checks, lambda share: watch(0.6 + 0.4 * share))
         explanations = Explanations(causes, diagnostics, posterior, tests)
@@ -145,7 +134,7 @@ class Diagnose(Analysis):
         notes += [f"{', '.join(zero)}: tolerance 0, no causes"] if zero else []
         return Diagnosis(
             title=scene.title,
-            sources=tuple(dict.fromkeys(diagnostics.observations.sets)),
+            sources=tuple(dict.fromkeys(observations.sets)),
             causes=tuple(entries),
             not_geometric=sum(posterior.disturbed.values()),
             within_tolerance=posterior.within,
@@ -312,6 +301,7 @@ class Explanations:
         return f"up to {largest_um:.1f} µm in the volume, at {place_words(place)}"
 
 
+@cache
 def load_remedies() -> Mapping[str, tuple[str, str]]:
     """Read element and remedy of each class of causes, with the source."""
     path = assets_dir() / "remedies.toml"

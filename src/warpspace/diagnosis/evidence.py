@@ -16,7 +16,12 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.calibration.solve import orthonormal_basis, project_out
+from warpspace.calibration.solve import (
+    CheckCancelled,
+    never_cancelled,
+    orthonormal_basis,
+    project_out,
+)
 from warpspace.diagnosis.causes import Cause
 from warpspace.units import Array
 
@@ -140,9 +145,10 @@ class Diagnostics:
         causes: Sequence[Cause],
         observations: Observations,
         prior_not_geometric: float = PRIOR_NOT_GEOMETRIC,
+        check_cancelled: CheckCancelled = never_cancelled,
     ) -> None:
         self.causes, self.observations = tuple(causes), observations
-        self.prior_not_geometric = prior_not_geometric
+        self.prior_not_geometric, self.check_cancelled = prior_not_geometric, check_cancelled
         ends = np.cumsum([0, *(cause.shape.shape[1] for cause in causes)])
         self.blocks = [
             np.arange(end - c.shape.shape[1], end) for end, c in zip(ends[1:], causes, strict=True)
@@ -171,10 +177,7 @@ class Diagnostics:
         for at in np.flatnonzero(logs[:-1] > logs.max() - PROMISING):
             logs[at] += self._log_outside(self.hypotheses[at], mean)
         noise = {
-            name: log_sum(
-                np.array([n.condition(readings / d)[1] - np.log(d).sum() - base for n, d in models])
-            )
-            - np.log(2.0 * len(self._disturbed) * len(models) / self.prior_not_geometric)
+            name: self._log_noise(models, readings) - base
             for name, models in self._disturbed.items()
         }
         noise["outliers"] = self._log_outliers(weighted) + np.log(self.prior_not_geometric / 2.0)
@@ -220,12 +223,17 @@ class Diagnostics:
             inside = np.array([label == name for label in observations.sets])
             for factor in NOISE_FACTORS:
                 divisor = np.where(inside, np.hypot(1.0, factor * observations.tolerance), 1.0)
-                scaled = (
-                    matrix / divisor[:, None]
-                    for matrix in (observations.columns, observations.by_unknown)
-                )
-                models.setdefault(name, []).append((Normal.of(*scaled), divisor))
+                columns = observations.columns / divisor[:, None]
+                by_unknown = observations.by_unknown / divisor[:, None]
+                models.setdefault(name, []).append((Normal.of(columns, by_unknown), divisor))
+                self.check_cancelled()
         return models
+
+    def _log_noise(self, models: Sequence[tuple[Normal, Array]], readings: Array) -> float:
+        """Compute the log evidence and prior of more noise in one file."""
+        logs = [normal.condition(readings / d)[1] - np.sum(np.log(d)) for normal, d in models]
+        prior = self.prior_not_geometric / 2.0 / len(self._disturbed) / len(models)
+        return log_sum(np.array(logs)) + float(np.log(prior))
 
     def _log_outliers(self, weighted: Array) -> float:
         """Compute the log evidence of one to three outliers.

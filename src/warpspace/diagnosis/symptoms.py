@@ -9,7 +9,12 @@ import numpy as np
 from warpspace.analysis.options import place_words
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import TestReadings
-from warpspace.calibration.solve import MeasurementModel, project_out
+from warpspace.calibration.solve import (
+    CheckCancelled,
+    MeasurementModel,
+    never_cancelled,
+    project_out,
+)
 from warpspace.diagnosis.causes import CauseSet
 from warpspace.diagnosis.evidence import Observations
 from warpspace.exceptions import OptionError, WarpspaceError
@@ -17,7 +22,7 @@ from warpspace.kinematics.relative_motion import relative_point
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, Array
 
-MAX_COMPONENTS = 10_000  # of all readings
+MAX_COMPONENTS = 5_000  # of all readings
 SYMPTOM_SHARE = 0.2  # standard uncertainty of a symptom, relative to its amount
 CONTRADICTION = 3.0  # length of the residual, in standard uncertainties
 MIN_SHARE = 0.05  # of it, of a symptom that contradicts another one
@@ -53,8 +58,14 @@ WORDS = {
 }
 
 
-def observe(causes: CauseSet, model: MeasurementModel, noise_mm: float) -> Observations:
+def observe(
+    causes: CauseSet,
+    sets: Sequence[Readings],
+    noise_mm: float,
+    check_cancelled: CheckCancelled = never_cancelled,
+) -> Observations:
     """Build the observations of readings; those without a stated uncertainty have `noise_mm`."""
+    model = MeasurementModel.of(causes.scene, sets, check_cancelled)
     if model.size > MAX_COMPONENTS:
         raise OptionError(f"{model.size:,} readings; expected at most {MAX_COMPONENTS:,}")
     by_variable, by_unknown = causes.respond(model)
