@@ -124,7 +124,6 @@ class Diagnose(Analysis):
         if rare:
             summary = f"{len(rare)} others, each below {RARE:.1%}"
             entries.append(replace(explanations.explain(rare, EXPLAINED), summary=summary))
-        gain = np.exp(posterior.logs) @ (posterior.logs - diagnostics.log_priors)
         notes = [f"“{symptom.text}”: {symptom.assumed}" for symptom in symptoms]
         if symptoms:
             notes.append(f"standard uncertainty of a symptom: {SYMPTOM_SHARE:.0%} of its amount")
@@ -140,7 +139,7 @@ class Diagnose(Analysis):
             within_tolerance=posterior.within,
             next=tuple(tests[: self.next_count]),
             disturbed=max(posterior.disturbed, key=posterior.disturbed.__getitem__),
-            gained_bits=float(gain / np.log(2.0)) + sum(posterior.disturbed.values()),
+            gained_bits=diagnostics.gained_bits(posterior),
             notes=(*(note for readings in sets for note in readings.notes), *notes),
         )
 

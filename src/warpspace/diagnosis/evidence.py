@@ -261,6 +261,12 @@ class Diagnostics:
 
     # --- groups -----------------------------------------------------------------------------------
 
+    def gained_bits(self, posterior: Posterior) -> float:
+        """Compute the information of the readings on the cause, relative to the prior."""
+        shares = np.append(np.exp(posterior.logs), sum(posterior.disturbed.values()))
+        priors = np.append(np.exp(self.log_priors), self.prior_not_geometric)
+        return float(shares @ np.log2(np.maximum(shares, 1e-300) * priors.sum() / priors))
+
     def likeliest(self, causes: Causes, posterior: Posterior) -> Hypothesis:
         places = [at for at, h in enumerate(self.hypotheses) if h.causes == causes]
         return self.hypotheses[max(places, key=lambda at: posterior.logs[at])]
