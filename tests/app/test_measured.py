@@ -349,3 +349,42 @@ def test_a_file_that_does_not_say_its_axis_or_format_asks_in_the_words_of_the_pa
     assert "Files can also be dropped" in column.html
     with pytest.raises(SceneError):
         column.part.parse("nothing.bin", b"\0\1\2")()
+
+
+def diagnose():
+    state = replace(start_state(load_scene("machine_c_frame_mill")), nodes=5)
+    entry = next(one for one in entries() if one.name == "diagnose")
+    return Column(measurement.DiagnosePanel, state, entry)
+
+
+def test_a_symptom_and_a_file_are_diagnosed_on_the_page():
+    column = diagnose()
+    assert column.part.title == "What is wrong?"
+    assert "Diagnose" not in column.html.partition("<details")[0]
+    column.do(do.SetOption("diagnose", "symptoms", "step of 60 µm where Y reverses; oval"))
+    assert "expected for instance" in unescape(column.run())
+    column.do(do.SetOption("diagnose", "symptoms", "step of 60 µm where Y reverses"))
+    html = unescape(column.run())
+    assert "reversal of Y" in html
+    assert "drive of Y" in html
+    assert "Apply" not in html
+    # the file that only a stated kind can be read by
+    scene, kind = column.state.scene, "positioning:axis=Y"
+    rows = ["run,direction,target_mm,deviation_um"]
+    for run in (1, 2):
+        rows += [f"{run},{s},{t},{15 if s == '+' else -15}" for s in "+-" for t in (-250, 0, 250)]
+    text = "\n".join(rows).encode()
+    column.give("y.csv", text)
+    assert "expected those of a kind" in unescape(column.html)
+    column.do(do.SetOption("diagnose", "kinds", kind))
+    column.give("y.csv", text)
+    column.do(do.SetOption("diagnose", "symptoms", ""))
+    column.run()
+    found = column.part.outcome.result
+    sets = [measurement.parse_readings(text.decode(), "y.csv", scene, kind)]
+    said = measurement.Diagnose().diagnose(sets, scene, lambda _: None)
+    assert found.as_json() == said.as_json()
+    assert found.causes[0].causes == ("reversal of Y",)
+    column.do(do.Upload("diagnose", HOSTILE, 10_000_000, ""))
+    assert "9.5 MB" in column.html
+    assert HOSTILE not in column.html

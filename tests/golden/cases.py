@@ -71,6 +71,7 @@ _ONCE = {
     "calibrate": "calibrate fork_head_bc --data tcp_on.csv --kind sphere-tcp --next 1"
     " --csv {out}/r.csv",
     "calibrate-priors": "calibrate fork_head_bc --data tcp_on.csv --kind sphere-tcp --priors",
+    "diagnose": "diagnose fork_head_bc --data tcp_on.csv --kind sphere-tcp --noise 30 --next 1",
     "template-over": "import --template Y --positions=-200,0,200 --over z=-400,-100",
     "template-positions": "import --template c --positions 1,2,4 -o {out}/u.csv",
     "gains-max": "gains dvf5000_first --max --json",
@@ -85,6 +86,6 @@ CASES: dict[str, str] = {
 DAILY = frozenset(f"{name}-dvf5000_first" for name in _EACH) | {
     "scenes", "thesis-json", "new-machine", "compare-text", "contributions-text", "montecarlo-text",
     "allocate-text", "concepts-text", "circular-text", "rotary", "klipper", "convert",
-    "field-relative", "adjust-limits", "calibrate", "bad-option",
+    "field-relative", "adjust-limits", "calibrate", "diagnose", "bad-option",
 }  # fmt: skip
 """What `make test` runs of them."""

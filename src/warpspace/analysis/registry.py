@@ -68,6 +68,8 @@ _BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
      "Write the errors of SCENE in another convention."),
     ("calibrate", "measure", "calibration.calibrate:Calibrate",
      "Fit the errors of the machine of SCENE to measured data."),
+    ("diagnose", "measure", "diagnosis.diagnose:Diagnose",
+     "Rank the causes of readings and symptoms of SCENE."),
     ("part", "measure", "parts.part:Part",
      "Evaluate a part, a mesh, as the machine of SCENE cuts it."),
     ("program", "measure", "parts.program:Program",

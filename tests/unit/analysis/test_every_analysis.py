@@ -53,6 +53,11 @@ NEEDED = {
     "allocate": ("dvf5000_general", {"limit_um": 60.0}, ["--limit", "60"]),
     "conformance": ("dvf5000_first", {"limit_um": 40.0}, ["--limit", "40"]),
     "calibrate": ("fork_head_bc", {"data": ("tcp_on.csv",)}, ["--data", "tcp_on.csv"]),
+    "diagnose": (
+        "dvf5000_general",
+        {"symptoms": ("step of 60 µm where Y reverses",)},
+        ["--symptom", "step of 60 µm where Y reverses"],
+    ),
     "clamp": ("dvf5000_first", {"file": PLATE, "place": (0, 0, 50)}, [PLATE, "--place", "0,0,50"]),
     "part": (
         "dvf5000_first",

@@ -44,7 +44,7 @@ TITLES = {
     "form": "Flatness, straightness, squareness", "convert": "Another convention",
     "montecarlo": "Random machines", "contributions": "Contributions of tolerances",
     "adjust": "Adjustment", "allocate": "Tolerances", "concepts": "Machines side by side",
-    "acceptance": "Acceptance tests",
+    "acceptance": "Acceptance tests", "diagnose": "What is wrong?",
 }  # fmt: skip
 """Titles of sections that differ from the name of the command."""
 OF_STATE = frozenset({"loop", "placed", "limit_um"})  # options set once, for the whole page

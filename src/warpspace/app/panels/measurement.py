@@ -3,13 +3,14 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.blocks import Lines, Table
 from warpspace.analysis.description import Analysis, ProgressCallback, Result
+from warpspace.analysis.options import Grammar, option
 from warpspace.analysis.registry import Entry
 from warpspace.app.browser import actions as do
 from warpspace.app.browser.html import EMPTY, join
@@ -33,6 +34,8 @@ from warpspace.calibration.calibrate import Calibrate
 from warpspace.calibration.calibration_result import Calibration
 from warpspace.calibration.readings import bundled_data, parse_reading_table
 from warpspace.calibration.registry import KINDS, parse_readings
+from warpspace.diagnosis.diagnose import Diagnose, Diagnosis
+from warpspace.diagnosis.symptoms import FORMS
 from warpspace.exceptions import OptionError
 from warpspace.resources import find_data
 from warpspace.scene.model import Scene
@@ -318,3 +321,47 @@ def _kind_words(kind: str) -> str:
     if name in KINDS:
         return KINDS[name].description
     return find_test(name).title if name in bench_names() else name
+
+
+# --- Diagnosis ------------------------------------------------------------------------------------
+
+
+def _split_symptoms(text: str, _scene: Scene) -> tuple[str, ...]:
+    return tuple(filter(None, (part.strip() for part in text.split(";"))))
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiagnoseTexts(Diagnose):
+    symptoms: Annotated[tuple[str, ...], Grammar("TEXT; TEXT", _split_symptoms)] = option(
+        (), f"Symptoms, separated by semicolons: {', or '.join(FORMS)}"
+    )
+    files: tuple[UploadedFile, ...] = ()
+
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> Diagnosis:
+        parsed = (parse_readings(f.content, f.name, scene, f.kind) for f in self.files)
+        return self.diagnose(list(parsed), scene, watch)
+
+
+class DiagnosePanel(FilesPanel):
+    """Uploaded readings and typed symptoms, and their causes."""
+
+    own_kind = DiagnoseTexts
+    sentence = "The likeliest causes of readings and symptoms, and how to confirm them"
+    run_label = "Diagnose"
+
+    def is_ready(self, state: AppState) -> bool:
+        return bool(self.files or self.values(state).get("symptoms"))
+
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        return {"files": self.files}
+
+    def before_result(self, state: AppState) -> Markup:
+        return join((self.files_html(), HTML.upload("Add readings …", self.name, MOST_BYTES)))
+
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
+        """Parse a file; its kind is that stated at its place, or the last one."""
+        kinds = self.values(self.context.state).get("kinds", "").split()
+        kind = kinds[min(len(self.files), len(kinds) - 1)] if kinds else None
+        text, _ = decode_text(content, name)
+        scene, files = self.context.state.active_scene(), self.files
+        return partial(self.set_files, (*files, read_uploaded(scene, text, name, kind, files)))

@@ -21,7 +21,7 @@ from warpspace.app.panels.error_list import ErrorsPanel
 from warpspace.app.panels.explanation import DistancePanel, VolumePanel, WorstPanel
 from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog, accepted_endings
 from warpspace.app.panels.improve import AdjustPanel, BestPanel, CompensatePanel
-from warpspace.app.panels.measurement import CalibratePanel, TestsPanel
+from warpspace.app.panels.measurement import CalibratePanel, DiagnosePanel, TestsPanel
 from warpspace.app.panels.note_panels import NoteNumbersPanel, NotesPanel, StoryPanel
 from warpspace.app.panels.panel import Context, Dialog, Panel, Refresh, Section, on, with_section
 from warpspace.app.panels.playback import PlaybackPanel
@@ -261,6 +261,7 @@ PANELS: dict[str, type[AnalysisPanel]] = {
     "calibrate": CalibratePanel, "adjust": AdjustPanel, "compensate": CompensatePanel,
     "allocate": TolerancesPanel, "concepts": ConceptsPanel, "distance": DistancePanel,
     "part": PartPanel, "program": ProgramPanel, "acceptance": AcceptancePanel,
+    "diagnose": DiagnosePanel,
 }  # fmt: skip
 """Panels with features beyond the description of the analysis, by name of the analysis."""
 FIRST = ("compensate", "concepts", "allocate")  # sections at the top of their task

@@ -1,0 +1,1 @@
+"""Diagnosis: causes of readings and symptoms, ranked by their posterior probability."""
