@@ -431,7 +431,7 @@ class StepSearch:
                 np.concatenate([high, np.ones(count), [ceiling_um], magnitude]),
             ),
             constraints=[condition for condition in conditions if condition.A.size],
-            # with presolve, HiGHS prints messages of its own
+            # with presolve, HiGHS prints more messages of its own
             options={"presolve": False, "mip_rel_gap": 1e-9, "time_limit": seconds},
         )
         if solution.x is None:
