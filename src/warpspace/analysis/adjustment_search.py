@@ -320,6 +320,8 @@ def _joined(indices: Sequence[int]) -> tuple[int, ...]:
 
 
 MOST_CUTS = 400  # steps of the search for one number of acts
+RANK = 1e-3  # preference of an act over the next one, among equal plans
+TIE_UM = 1e-5  # objectives that differ by less are equal
 MOST_SECONDS = 60.0  # for one number of acts
 
 
@@ -349,21 +351,27 @@ class StepSearch:
         planes, offsets = [np.zeros((0, 2 * len(self.steps) + 1))], [np.zeros(0)]
         best, best_um = np.zeros(len(self.steps)), self.evaluate(np.zeros(len(self.steps)))[0]
         for size in range(1, min(count, len(self.steps)) + 1):
-            before_um, proven, end_s = best_um, False, time.monotonic() + MOST_SECONDS
+            before_um, ceiling_um, proven = best_um, np.inf, False
+            end_s = time.monotonic() + MOST_SECONDS
             for number in range(MOST_CUTS):
                 advance((size - 1 + number / MOST_CUTS) / count)
                 below = np.concatenate(planes), np.concatenate(offsets)
-                change, bound_um = self._relaxed(size, *below, end_s - time.monotonic())
-                proven = change is not None and best_um - bound_um < CLOSE_UM
-                if change is None or proven:
+                change, bound_um = self._relaxed(size, *below, ceiling_um, end_s - time.monotonic())
+                if change is None:
                     break
+                if not proven and best_um - bound_um < CLOSE_UM:
+                    proven, ceiling_um = True, best_um + TIE_UM
+                    continue
                 value_um, slopes, heights = self.evaluate(change)
                 mean, slope = self.volume.mean(self._indices, change)
-                if mean > self.mean_um + CLOSE_UM:
+                is_allowed = mean <= self.mean_um + CLOSE_UM
+                if is_allowed and value_um < (2.0 * TIE_UM + best_um if proven else best_um):
+                    best, best_um = change, value_um
+                    if proven:
+                        break
+                elif not is_allowed:
                     slopes = np.concatenate([slopes, np.append(slope, 0.0)[None]])
                     heights = np.append(heights, self.mean_um - mean + slope @ change)
-                elif value_um < best_um:
-                    best, best_um = change, value_um
                 planes.append(np.insert(slopes, [len(change)] * len(change), 0.0, axis=1))
                 offsets.append(heights)
             if best_um > before_um - CLOSE_UM:
@@ -386,37 +394,46 @@ class StepSearch:
         return value_um, np.append(unit @ chosen, [[-1.0]], axis=1), -unit @ error
 
     def _relaxed(
-        self, size: int, planes: Array, offsets: Any, seconds: float
+        self, size: int, planes: Array, offsets: Any, ceiling_um: float, seconds: float
     ) -> tuple[Array | None, float]:
         """Return the best whole steps for the planes, [A], and the lower bound of the objective.
 
-        None where the solver ran out of time.
+        With a ceiling of the objective, the smallest steps below it, so that equal plans are
+        always told apart. None where there are none, or the solver ran out of time. Variables:
+        steps, whether an act is used, objective, magnitudes of the steps.
         """
         from scipy.optimize import LinearConstraint, milp
 
         if seconds <= 0.0:
             return None, -np.inf
-        low, high = self.steps.T
-        acts, still = np.eye(len(low)), np.zeros((len(low), 1))
-        goal = np.append(np.zeros(2 * len(low)), 1.0)
+        (low, high), count = self.steps.T, len(self.steps)
+        acts, none, still = np.eye(count), np.zeros((count, count)), np.zeros((count, 1))
+        goal = np.zeros(3 * count + 1)
+        goal[2 * count] = 1.0
+        if ceiling_um < np.inf:
+            goal[2 * count :] = [0.0, *(1.0 + RANK * np.arange(count))]
+        used = np.repeat([0.0, 1.0, 0.0], [count, count, count + 1])
         conditions = [
-            LinearConstraint(np.hstack([acts, -np.diag(high), still]), -np.inf, 0.0),
-            LinearConstraint(np.hstack([acts, -np.diag(low), still]), 0.0, np.inf),
-            LinearConstraint(np.hstack([0.0 * low, np.ones(len(low)), [0.0]]), 0.0, size),
-            LinearConstraint(np.pad(self.rows, ((0, 0), (0, len(low) + 1))), *self.limits.T),
-            LinearConstraint(planes, -np.inf, offsets),
+            LinearConstraint(np.hstack([acts, -np.diag(high), still, none]), -np.inf, 0.0),
+            LinearConstraint(np.hstack([acts, -np.diag(low), still, none]), 0.0, np.inf),
+            LinearConstraint(np.hstack([acts, none, still, acts]), 0.0, np.inf),
+            LinearConstraint(np.hstack([-acts, none, still, acts]), 0.0, np.inf),
+            LinearConstraint(used, 0.0, size),
+            LinearConstraint(np.pad(self.rows, ((0, 0), (0, 2 * count + 1))), *self.limits.T),
+            LinearConstraint(np.pad(planes, ((0, 0), (0, count))), -np.inf, offsets),
         ]
+        magnitude = np.maximum(-low, high)
         solution = milp(
             goal,
-            integrality=1.0 - goal,
+            integrality=np.repeat([1.0, 0.0], [2 * count, count + 1]),
             bounds=(
-                np.append(low, np.zeros(len(low) + 1)),
-                np.append(high, [*np.ones(len(low)), np.inf]),
+                np.append(low, np.zeros(2 * count + 1)),
+                np.concatenate([high, np.ones(count), [ceiling_um], magnitude]),
             ),
-            constraints=[c for c in conditions if c.A.size],
-            # with presolve, HiGHS prints messages of its own
+            constraints=[condition for condition in conditions if condition.A.size],
+            # with presolve, HiGHS prints more messages of its own
             options={"presolve": False, "mip_rel_gap": 1e-9, "time_limit": seconds},
         )
         if solution.x is None:
             return None, -np.inf
-        return np.round(solution.x[: len(low)]), float(solution.mip_dual_bound)
+        return np.round(solution.x[:count]), float(solution.mip_dual_bound)

@@ -464,7 +464,7 @@ def test_a_search_that_is_cut_short_claims_no_proof(monkeypatch):
     search = StepSearch(volume, Objective.RMS, np.array([[-3.0, 3.0]] * 4), *free)
     ((best, proven),) = search.best_sets(2, lambda _: None)  # a second act gains nothing
     assert proven
-    monkeypatch.setattr(adjustment_search, "MOST_CUTS", 10)
+    monkeypatch.setattr(adjustment_search, "MOST_CUTS", 4)
     ((same, proven),) = search.best_sets(1, lambda _: None)
     assert np.array_equal(same, best)
     assert not proven
