@@ -13,6 +13,8 @@ from warpspace.calibration.readings import Readings
 from warpspace.kinematics import transforms
 from warpspace.units import MM_PER_UM, UM_PER_MM, Array
 
+UNSEEN = 3.0  # with it 95 % of intervals hold (simulated) where the scatter hides the variation
+
 
 @dataclass(frozen=True)
 class SessionTerms:
@@ -39,7 +41,8 @@ class SessionTerms:
         """Estimate the variation by moments: squared terms less their variance from the scatter.
 
         The numbers of the shape are pooled. The degrees of freedom are reduced by the variance that
-        is subtracted, so that those of the sum are 3·(m − 1), also where no variation is seen.
+        is subtracted, so that those of the sum are s·(m − 1), and `UNSEEN` times that where no
+        variation is seen.
         `covariance`, [u, u], is that of the unknowns; `scatter` is sigma, mm, and its dof.
         """
         parts = tuple(readings for readings in sets if readings.part)
@@ -59,7 +62,9 @@ class SessionTerms:
             return build(stated, np.inf, "stated")
         if not free:
             return build(None, np.inf, "unknown")
-        total = max(float(np.sum(values**2)), variance * (1.0 + 1e-6), 1e-18)
+        total, least = float(np.sum(values**2)), max(variance * (1.0 + 1e-6), 1e-18)
+        if total < least:  # no variation is seen
+            total, free = least, UNSEEN * free
         u = float(np.sqrt((total - variance) / free))
         return build(u, free * (1.0 - variance / total) ** 2, "estimated")
 
