@@ -328,7 +328,7 @@ def _report(fit: Fit, predict: Sequence[Readings]) -> Calibration:
             *frame_notes(fit),
         ),
         observability=observability(scene, model.sets, model.check_cancelled),
-        sessions=terms.as_json(fit) if terms else {},
+        sessions=terms.as_json() if terms else {},
     )
 
 

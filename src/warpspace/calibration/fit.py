@@ -11,8 +11,9 @@ from warpspace.calibration import solve
 from warpspace.calibration.calibration_result import Residuals
 from warpspace.calibration.instruments import NO_INSTRUMENT, Instrument, common_mode, effective_dof
 from warpspace.calibration.kinds import in_other_frame
-from warpspace.calibration.part_reports import SessionTerms, check_dimensions, couple_parts
+from warpspace.calibration.part_reports import check_dimensions, couple_parts
 from warpspace.calibration.readings import Readings
+from warpspace.calibration.session_terms import SessionTerms
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import build_basis
 from warpspace.kinematics.model import Loop
@@ -195,7 +196,12 @@ class Fit:
     @cached_property
     def session_terms(self) -> SessionTerms | None:
         """The variation between the parts of inspection reports."""
-        return SessionTerms.of(self)
+        unknown = dict(zip(self.model.unknowns, self.solved.unknown.tolist(), strict=True))
+        covariance = self.scatter_covariance[len(self.fitted.keys) :, len(self.fitted.keys) :]
+        scatter = self.sigma_mm, self.scatter_dof
+        return SessionTerms.of(
+            self.model.sets, unknown, covariance, scatter, self.options.session_u
+        )
 
     @cached_property
     def session_shift(self) -> Array:
@@ -203,7 +209,7 @@ class Fit:
         if self.session_terms is None:
             return np.zeros((len(self.scatter_covariance), 0))
         shift = self.gain @ self.session_terms.columns(self.model.sets)
-        return shift / np.sqrt(len(self.session_terms.labels))
+        return shift / np.sqrt(len(self.session_terms.parts))
 
     @cached_property
     def covariance_parts(self) -> Array:
