@@ -205,8 +205,10 @@ class Diagnosis(Result):
                 continue
             yield f"{entry.title}: {100.0 * entry.probability:.0f} %"
             if entry.single_causes:
-                rest = len(entry.single_causes) - NAMED
-                names = ", ".join(entry.single_causes[:NAMED]) + f" and {rest} more" * (rest > 0)
+                unnamed = len(entry.single_causes) - NAMED
+                names = ", ".join(entry.single_causes[:NAMED]) + f" and {unnamed} more" * (
+                    unnamed > 0
+                )
                 yield f"  not separated from {names}"
             if entry.effect:
                 yield f"  effect: {entry.effect}"
