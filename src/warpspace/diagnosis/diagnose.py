@@ -205,9 +205,10 @@ class Diagnosis(Result):
                 continue
             yield f"{entry.title}: {100.0 * entry.probability:.0f} %"
             if entry.single_causes:
-                rest = len(entry.single_causes) - NAMED
-                names = ", ".join(entry.single_causes[:NAMED]) + f" and {rest} more" * (rest > 0)
-                yield f"  not separated from {names}"
+                names = ", ".join(entry.single_causes[:NAMED])
+                unnamed = len(entry.single_causes) - NAMED
+                more = f" and {unnamed} more" if unnamed > 0 else ""
+                yield f"  not separated from {names}{more}"
             if entry.effect:
                 yield f"  effect: {entry.effect}"
             if entry.confirm is not None:
