@@ -20,6 +20,7 @@ from warpspace.acceptance_tests.polytope import (
     Polytope,
 )
 from warpspace.analysis.description import NO_JSON, ProgressCallback
+from warpspace.analysis.integer_program import solve_integer_program
 from warpspace.bench.base import BenchTest
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.scene.model import Scene
@@ -191,17 +192,10 @@ class FurtherTests:
 
         The candidates that each machine fails, [M, C].
         """
-        from scipy.optimize import Bounds, LinearConstraint, milp
-
         costs = 1.0 + self.minutes / (1.0 + self.minutes.sum())
-        optimum = milp(
-            costs,
-            integrality=np.ones(len(costs)),
-            bounds=Bounds(0.0, 1.0),
-            constraints=LinearConstraint(fails.astype(float), 1.0),
-            options={"mip_rel_gap": 0.0},
-        )
-        return np.flatnonzero(np.round(optimum.x)).tolist()
+        is_integer, rows = np.ones(len(costs), dtype=bool), fails.astype(float)
+        chosen, _ = solve_integer_program(costs, rows, (1.0, np.inf), (0.0, 1.0), is_integer)
+        return np.flatnonzero(np.round(costs if chosen is None else chosen)).tolist()
 
 
 def _keep_share(watch: ProgressCallback, share: float, _part: float) -> None:

@@ -11,6 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from warpspace.analysis.integer_program import solve_integer_program
 from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.field.evaluate import ErrorBasis
 from warpspace.field.grid import Grid
@@ -402,8 +403,6 @@ class StepSearch:
         always told apart. None where there are none, or the solver ran out of time. Variables:
         steps, whether an act is used, objective, magnitudes of the steps.
         """
-        from scipy.optimize import LinearConstraint, milp
-
         if seconds <= 0.0:
             return None, -np.inf
         (low, high), count = self.steps.T, len(self.steps)
@@ -413,27 +412,25 @@ class StepSearch:
         if ceiling_um < np.inf:
             goal[2 * count :] = [0.0, *(1.0 + RANK * np.arange(count))]
         used = np.repeat([0.0, 1.0, 0.0], [count, count, count + 1])
-        conditions = [
-            LinearConstraint(np.hstack([acts, -np.diag(high), still, none]), -np.inf, 0.0),
-            LinearConstraint(np.hstack([acts, -np.diag(low), still, none]), 0.0, np.inf),
-            LinearConstraint(np.hstack([acts, none, still, acts]), 0.0, np.inf),
-            LinearConstraint(np.hstack([-acts, none, still, acts]), 0.0, np.inf),
-            LinearConstraint(used, 0.0, size),
-            LinearConstraint(np.pad(self.rows, ((0, 0), (0, 2 * count + 1))), *self.limits.T),
-            LinearConstraint(np.pad(planes, ((0, 0), (0, count))), -np.inf, offsets),
+        rows = [
+            np.hstack([acts, -np.diag(high), still, none]),
+            np.hstack([-acts, np.diag(low), still, none]),
+            np.hstack([-acts, none, -still, -acts]),
+            np.hstack([acts, none, -still, -acts]),
+            used[None],
+            np.pad(self.rows, ((0, 0), (0, 2 * count + 1))),
+            np.pad(planes, ((0, 0), (0, count))),
         ]
-        magnitude = np.maximum(-low, high)
-        solution = milp(
-            goal,
-            integrality=np.repeat([1.0, 0.0], [2 * count, count + 1]),
-            bounds=(
-                np.append(low, np.zeros(2 * count + 1)),
-                np.concatenate([high, np.ones(count), [ceiling_um], magnitude]),
-            ),
-            constraints=[condition for condition in conditions if condition.A.size],
-            # with presolve, HiGHS prints more messages of its own
-            options={"presolve": False, "mip_rel_gap": 1e-9, "time_limit": seconds},
+        least = np.full(sum(map(len, rows)), -np.inf)
+        first = 4 * count + 1
+        least[first : first + len(self.rows)] = self.limits[:, 0]
+        largest = np.concatenate([np.zeros(4 * count), [size], self.limits[:, 1], offsets])
+        bounds = (
+            np.append(low, np.zeros(2 * count + 1)),
+            np.concatenate([high, np.ones(count), [ceiling_um], np.maximum(-low, high)]),
         )
-        if solution.x is None:
-            return None, -np.inf
-        return np.round(solution.x[:count]), float(solution.mip_dual_bound)
+        is_integer = np.arange(3 * count + 1) < 2 * count
+        best, bound = solve_integer_program(
+            goal, np.vstack(rows), (least, largest), bounds, is_integer, seconds
+        )
+        return None if best is None else np.round(best[:count]), bound

@@ -46,7 +46,7 @@ class Grammar:
     many: bool = False
     each: bool = False  # whether it may be given several times, each value read by itself
     is_file: bool = False  # whether it names a file that is read
-    is_extended: bool = False  # whether it names a file that is read, if any, and extended
+    is_extended: bool = False  # whether it names a file that is read, if any, or written
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,7 +37,7 @@ from warpspace.calibration.registry import pair_kinds, read_readings
 from warpspace.calibration.solve import CheckCancelled, never_cancelled, read_keys, rms_mm
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.parts.inspection_report import MAX_SESSION_U
-from warpspace.parts.workpiece import read_place
+from warpspace.parts.workpiece import place_part, read_place
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM
 
@@ -138,8 +138,7 @@ class Calibrate(Analysis):
     def run(self, scene: Scene, watch: ProgressCallback, /) -> Calibration:
         names = (*self.data, *self.predict)
         kinds = pair_kinds(names, self.kinds)
-        part = replace(scene.part, place=(*self.place, 0.0, 0.0, 0.0)[:6] if self.place else None)
-        placed = replace(scene, part=part) if self.place else scene
+        placed = place_part(scene, self.place)
         sets = [
             read_readings(name, placed, kind, self.frame)
             for name, kind in zip(names, kinds, strict=True)

@@ -12,8 +12,9 @@ from warpspace.analysis.blocks import Block, Column, Table
 from warpspace.analysis.description import NO_JSON, Analysis, ProgressCallback, Result
 from warpspace.analysis.options import Files, Grammar, option, place_words, typed_word
 from warpspace.calibration.next_best import candidates
+from warpspace.calibration.part_reports import couple_parts
 from warpspace.calibration.readings import Readings
-from warpspace.calibration.registry import read_readings
+from warpspace.calibration.registry import pair_kinds, read_readings
 from warpspace.diagnosis.causes import CauseSet
 from warpspace.diagnosis.evidence import (
     PRIOR_NOT_GEOMETRIC,
@@ -29,6 +30,7 @@ from warpspace.diagnosis.symptoms import SYMPTOM_SHARE, check_symptoms, observe,
 from warpspace.exceptions import OptionError
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import MAX_SCENE_BYTES
+from warpspace.parts.workpiece import place_part, read_place
 from warpspace.resources import assets_dir
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import parse_toml, read_text
@@ -74,6 +76,11 @@ class Diagnose(Analysis):
         " 20 µm where Y reverses",
         flag="--symptom",
     )
+    place: Annotated[tuple[float, ...] | None, Grammar("X,Y,Z[,A,B,C]", read_place)] = option(
+        None,
+        "Where parts of inspection reports were clamped, in the workpiece frame, mm and degrees",
+        unset="that of the scene",
+    )
     noise_um: float = option(
         1.0,
         "Standard uncertainty of a reading without a column u_um",
@@ -84,12 +91,9 @@ class Diagnose(Analysis):
     next_count: int = option(3, "Checks that are proposed", flag="--next", low=1, high=MAX_NEXT)
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "Diagnosis":
-        count = len(self.data)
-        kinds = self.kinds if len(self.kinds) > 1 else (self.kinds or (None,)) * count
-        if len(kinds) != count:
-            raise OptionError(f"{len(kinds)} values of {{kinds}}; expected 1 or {count}")
-        pairs = zip(self.data, kinds, strict=True)
-        sets = [read_readings(name, scene, kind) for name, kind in pairs]
+        placed = place_part(scene, self.place)
+        pairs = zip(self.data, pair_kinds(self.data, self.kinds), strict=True)
+        sets = [read_readings(name, placed, kind) for name, kind in pairs]
         return self.diagnose(sets, scene, watch)
 
     def diagnose(
@@ -107,7 +111,8 @@ class Diagnose(Analysis):
         if parts:
             check_symptoms(reduce(Observations.joined, parts))
         if sets:
-            named = [replace(readings, source=Path(readings.source).name) for readings in sets]
+            coupled = couple_parts(sets)
+            named = [replace(readings, source=Path(readings.source).name) for readings in coupled]
             parts.append(observe(causes, named, noise_mm, partial(watch, 0.0)))
         prior = PRIOR_NOT_GEOMETRIC if sets else PRIOR_SYMPTOM_WRONG
         observations = reduce(Observations.joined, parts)

@@ -117,7 +117,7 @@ class Part(WorkpieceAnalysis):
         low=0.0,
         high=MAX_SESSION_U,
     )
-    seal: Annotated[str | None, Grammar("FILE", typed_word)] = option(
+    seal: Annotated[str | None, Grammar("FILE", typed_word, is_extended=True)] = option(
         None,
         "Write the predicted report with a hash; verify an existing one",
         unset="none",

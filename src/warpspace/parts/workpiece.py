@@ -210,6 +210,13 @@ def read_place(text: str, _scene: Scene | None) -> tuple[float, ...]:
     return place
 
 
+def place_part(scene: Scene, place: Sequence[float] | None) -> Scene:
+    """Return a scene whose part is clamped at a place; the same scene without one."""
+    if place is None:
+        return scene
+    return replace(scene, part=replace(scene.part, place=(*place, 0.0, 0.0, 0.0)[:6]))
+
+
 @dataclass(frozen=True, kw_only=True)
 class WorkpieceAnalysis(Analysis):
     """An analysis of a workpiece where it is clamped."""

@@ -138,7 +138,10 @@ def test_remedies_have_text_and_source():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"kinds": ("a", "b"), "symptoms": (OVAL,)}, "2 values of kinds; expected 1 or 0"),
+        (
+            {"kinds": ("a", "b"), "symptoms": (OVAL,)},
+            "2 values of kinds for 0 files; expected 1 or 0",
+        ),
         ({"symptoms": (OVAL,) * 13}, "13 values of symptoms; expected at most 12"),
         ({"noise_um": 0.0}, "noise_um"),
     ],
