@@ -362,10 +362,10 @@ def find_worst_machine(
         factor = find_factor(agreeing, constraints, worst, request.keep_um, watch)
         report = replace(report, keep_um=request.keep_um, factor=factor)
     if request.next_count:
-        further = FurtherTests(agreeing, tests, constraints, watch)
-        report = replace(report, next=tuple(further.find_next(worst, request.next_count)))
+        search = FurtherTests(agreeing, tests, constraints, watch)
+        report = replace(report, next=tuple(search.find_next(worst, request.next_count)))
         if scene.limit_um is not None:
-            smallest = further.find_smallest_set(scene.limit_um)
+            smallest = search.find_smallest_set(scene.limit_um)
             smallest = None if smallest is None else tuple(smallest)
             report = replace(report, limit_um=scene.limit_um, smallest_set=smallest)
     return report

@@ -260,9 +260,9 @@ def find_remainders(points: Array, chosen: Integers) -> Array:
     """Compute what remains of points, [n, d], as weighted means of chosen ones, sums of sizes."""
     from scipy.optimize import nnls
 
-    left, size, _ = np.linalg.svd(points, full_matrices=False)
+    vectors, size, _ = np.linalg.svd(points, full_matrices=False)
     is_used, ones = size > RANK_TOLERANCE * size[0], np.full(len(points), size[0] or 1.0)
-    coordinates = np.column_stack([left[:, is_used] * size[is_used], ones])
+    coordinates = np.column_stack([vectors[:, is_used] * size[is_used], ones])
     remainders, basis = np.zeros(len(points)), coordinates[chosen].T
     for index in np.setdiff1d(np.arange(len(points)), chosen):
         weights, _ = nnls(basis, coordinates[index])

@@ -10,7 +10,7 @@ import numpy as np
 from warpspace.acceptance_tests.error_curves import ErrorCurves
 from warpspace.acceptance_tests.polytope import MAX_ROWS, Constraint
 from warpspace.analysis.description import ProgressCallback
-from warpspace.analysis.uncertainty.propagation import NOT_STATED
+from warpspace.analysis.uncertainty.propagation import NOT_STATED, t_quantile
 from warpspace.bench.linear_form import LinearForm
 from warpspace.calibration.fit import FitOptions, with_scatter
 from warpspace.calibration.instruments import Instrument, common_mode, effective_dof
@@ -48,12 +48,10 @@ def limit_estimates(estimates: Sequence[Estimates]) -> tuple[Constraint, ...]:
     normal ones the probability is 95 % exactly, for correlated ones at least that (Šidák, Journal
     of the American Statistical Association 62 (1967), 626).
     """
-    from scipy.stats import t
-
     count = sum(len(each.values) for each in estimates)
     constraints: list[Constraint] = []
     for each in estimates:
-        factor = t.ppf((1.0 + COVERAGE ** (1.0 / count)) / 2.0, each.dof)
+        factor = t_quantile((1.0 + COVERAGE ** (1.0 / count)) / 2.0, each.dof)
         width = factor * each.uncertainty
         form = LinearForm(each.rows / width[:, None], each.free / width[:, None])
         target, unknowns = each.values / width, each.unknowns

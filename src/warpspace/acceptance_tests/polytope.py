@@ -101,7 +101,7 @@ class Polytope:
         padded = np.append(cost, np.zeros(width - count))
         self._solver.changeColsCost(width, np.arange(width, dtype=np.int32), padded)
         while True:
-            if not self._solve() and not self._solve(anew=True):
+            if not self._solve() and not self._solve(is_restart=True):
                 raise InfeasibleError("no machine within the tolerances passes all tests")
             solution = self._solver.getSolution()
             point = np.array(solution.col_value)
@@ -115,9 +115,9 @@ class Polytope:
         offset = float(np.abs(dual).sum() + dual @ self._target[self._added])
         return Vertex(point[:count], float(cost @ point[:count]), gradient, offset)
 
-    def _solve(self, anew: bool = False) -> bool:
-        """Run the solver; anew where the basis of the solution before leads nowhere."""
-        if anew:
+    def _solve(self, is_restart: bool = False) -> bool:
+        """Run the solver; restart it where the basis of the solution before leads nowhere."""
+        if is_restart:
             self._solver.clearSolver()
         self._solver.run()
         return self._solver.getModelStatus() == highspy.HighsModelStatus.kOptimal

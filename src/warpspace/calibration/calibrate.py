@@ -8,6 +8,7 @@ import numpy as np
 
 from warpspace.analysis.description import Analysis, ProgressCallback
 from warpspace.analysis.options import PLACE, Files, Grammar, option, typed_word
+from warpspace.analysis.uncertainty.propagation import t_quantile
 from warpspace.calibration.calibration_result import (
     TARGETS,
     Calibration,
@@ -332,9 +333,7 @@ def _report(fit: Fit, predict: Sequence[Readings]) -> Calibration:
 
 
 def _estimates(fit: Fit) -> tuple[tuple[FittedParameter, ...], tuple[Combination, ...]]:
-    from scipy.stats import t
-
-    factors = t.ppf(0.975, fit.effective_dof)
+    factors = t_quantile(0.975, fit.effective_dof)
     widths = np.sqrt(np.diag(fit.covariance))
     start = dict(zip(fit.parameters.keys, fit.parameters.start.tolist(), strict=True))
     parameters: list[FittedParameter] = []

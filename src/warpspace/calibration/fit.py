@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from warpspace.analysis.uncertainty.propagation import t_quantile
 from warpspace.calibration import solve
 from warpspace.calibration.calibration_result import Residuals
 from warpspace.calibration.instruments import NO_INSTRUMENT, Instrument, common_mode, effective_dof
@@ -446,8 +447,6 @@ def _coverage(
     Variances: of the readings, of all that was fitted, and of the contributions that predicted and
     fitted readings share, less the part of these that the fit has absorbed.
     """
-    from scipy.stats import t
-
     weights = model.weights(fit.sigma_mm)[:, None]
     by_parameter, by_unknown = model.derivatives(fit.fitted, fit.solved.amplitudes, unknown)
     is_new = np.isin(model.unknowns, new)
@@ -468,7 +467,7 @@ def _coverage(
         variance += np.sum(added**2, axis=1)
         variance += np.sum((jacobian @ fit.session_shift[columns]) ** 2, axis=1)
     leverage = np.sum(set_up**2, axis=1)
-    half_widths = t.ppf(0.975, fit.scatter_dof) * np.sqrt(variance + 1.0 - leverage)
+    half_widths = t_quantile(0.975, fit.scatter_dof) * np.sqrt(variance + 1.0 - leverage)
     deviations = weights[:, 0] * np.concatenate([row.ravel() for row in residuals])
     return float(np.mean(np.abs(deviations) <= half_widths))
 

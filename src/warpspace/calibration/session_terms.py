@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from warpspace.analysis.uncertainty.propagation import t_quantile
 from warpspace.calibration.instruments import effective_dof
 from warpspace.calibration.part_reports import measured_part
 from warpspace.calibration.readings import Readings
@@ -102,8 +103,6 @@ class SessionTerms:
         The next part is measured as these are. Without u both intervals are None, and that of the
         mean holds for the measured part alone.
         """
-        from scipy.stats import t
-
         shapes, scatters = list[Array](), list[Array]()
         for readings in self.parts:
             inverse = measured_part(readings).shape.inverses[1]
@@ -119,7 +118,7 @@ class SessionTerms:
         for factor in (1.0 / count, 1.0 + 1.0 / count):
             terms = np.array([scatter, variance]) * factor
             dof = effective_dof(terms, [self.scatter_dof, self.dof])
-            halves.append(t.ppf(0.975, dof) * np.sqrt(terms.sum(axis=0)))
+            halves.append(t_quantile(0.975, dof) * np.sqrt(terms.sum(axis=0)))
         return [
             {
                 "measure": name,

@@ -212,8 +212,8 @@ class Diagnosis(Result):
             if entry.single_causes:
                 names = ", ".join(entry.single_causes[:NAMED])
                 unnamed = len(entry.single_causes) - NAMED
-                more = f" and {unnamed} more" if unnamed > 0 else ""
-                yield f"  not separated from {names}{more}"
+                ending = f" and {unnamed} more" if unnamed > 0 else ""
+                yield f"  not separated from {names}{ending}"
             if entry.effect:
                 yield f"  effect: {entry.effect}"
             if entry.confirm is not None:
@@ -275,7 +275,7 @@ class Explanations:
         """Find the element that has a cause, and its remedy."""
         remedies = load_remedies()
         if " " in name:
-            element, remedy = next(row for words, row in remedies.items() if name.startswith(words))
+            element, remedy = next(row for start, row in remedies.items() if name.startswith(start))
             return element.format(axis=name.rpartition(" ")[2]), remedy
         row, chain = parameter(name), self.set.scene.machine.chain
         branch = chain.tool if row.axis in chain.tool else chain.workpiece

@@ -140,8 +140,8 @@ def read_symptom(text: str, scene: Scene) -> Symptom:
     raise OptionError(f"{{symptoms}} {text!r}; {expected}")
 
 
-def _build_circle(scene: Scene, amount_um: float, words: re.Match[str]) -> Symptom:
-    plane, radius_mm = (words["plane"] or "xy").upper(), float(words["length"]) / 2.0
+def _build_circle(scene: Scene, amount_um: float, sentence: re.Match[str]) -> Symptom:
+    plane, radius_mm = (sentence["plane"] or "xy").upper(), float(sentence["length"]) / 2.0
     kind = f"circular:plane={plane}:radius={radius_mm:g}:points=72"
     readings = TestReadings(kind).plan_readings(scene)
     marks = readings.plan.marks if readings.plan else {}
@@ -149,19 +149,19 @@ def _build_circle(scene: Scene, amount_um: float, words: re.Match[str]) -> Sympt
     waves = [np.cos(2.0 * turn), np.sin(2.0 * turn)]
     design = [np.ones(len(turn)), np.cos(turn), np.sin(turn), *waves, *(sense * w for w in waves)]
     # the largest diameter exceeds the smallest by four amplitudes of the radius
-    wave = amount_um / 4.0 * np.exp(2j * np.deg2rad(float(words["angle"])))
+    wave = amount_um / 4.0 * np.exp(2j * np.deg2rad(float(sentence["angle"])))
     values, zero = np.array([wave.real, wave.imag]), np.zeros(2)
     rows = {None: (values,), "same": (values, zero), "opposite": (zero, values)}
-    values_um = np.concatenate(rows[words["directions"]])
+    values_um = np.concatenate(rows[sentence["directions"]])
     inverse = np.asarray(np.linalg.pinv(np.stack(design, -1)), dtype=np.float64)
     weights = inverse[3 : 3 + len(values_um)]
     assumed = f"{plane}, about {place_words(scene.workspace.positions)}; largest diameter minus"
     return Symptom(readings, weights, values_um, f"{assumed} smallest")
 
 
-def _build_plate(scene: Scene, amount_um: float, words: re.Match[str]) -> Symptom:
-    plane = (words["plane"] or "xy").upper()
-    readings, size = _build_corners(scene, plane, [words["length"], words["width"]])
+def _build_plate(scene: Scene, amount_um: float, sentence: re.Match[str]) -> Symptom:
+    plane = (sentence["plane"] or "xy").upper()
+    readings, size = _build_corners(scene, plane, [sentence["length"], sentence["width"]])
     weights = np.zeros((4, 3))
     for start, end, sign in ((0, 3, 1.0), (1, 2, -1.0)):
         along = readings.nominal_mm[end] - readings.nominal_mm[start]
@@ -171,18 +171,18 @@ def _build_plate(scene: Scene, amount_um: float, words: re.Match[str]) -> Sympto
     return Symptom(readings, weights.reshape(1, -1), np.array([amount_um]), assumed)
 
 
-def _build_taper(scene: Scene, amount_um: float, words: re.Match[str]) -> Symptom:
-    first = words["along"] or ("y" if words["across"] == "x" else "x")
-    second = words["across"] or ("x" if first == "y" else "y")
-    readings, size = _build_corners(scene, (first + second).upper(), [words["length"], None])
+def _build_taper(scene: Scene, amount_um: float, sentence: re.Match[str]) -> Symptom:
+    first = sentence["along"] or ("y" if sentence["across"] == "x" else "x")
+    second = sentence["across"] or ("x" if first == "y" else "y")
+    readings, size = _build_corners(scene, (first + second).upper(), [sentence["length"], None])
     apart = readings.nominal_mm[1] - readings.nominal_mm[0]
     weights = np.outer([1.0, -1.0, -1.0, 1.0], apart / np.linalg.norm(apart))
     assumed = f"{size}; two flanks, their distance growing along +{first.upper()}"
     return Symptom(readings, weights.reshape(1, -1), np.array([amount_um]), assumed)
 
 
-def _build_step(scene: Scene, amount_um: float, words: re.Match[str]) -> Symptom:
-    axis = words["axis"].upper()
+def _build_step(scene: Scene, amount_um: float, sentence: re.Match[str]) -> Symptom:
+    axis = sentence["axis"].upper()
     readings = TestReadings(f"positioning:axis={axis}").plan_readings(scene)
     sign = readings.plan.marks["travel_sign"] if readings.plan else np.zeros(1)
     assumed = f"{axis} approached from below minus from above"

@@ -47,7 +47,7 @@ MOST_ROWS = 30  # measurands in text; a file has all
 
 
 @dataclass(frozen=True)
-class Measurand:
+class ComparedMeasurand:
     """A number of a report beside its prediction; in µm, of the shape in µm/m or µrad."""
 
     name: str  # of the hole, or part
@@ -130,7 +130,7 @@ def compare_report(
     holes: PredictedHoles,
     u95_um: float | None = None,
     session_u: float = 0.0,
-) -> list[Measurand]:
+) -> list[ComparedMeasurand]:
     """Compare the measurands of a report with their prediction.
 
     `u95_um` is the expanded uncertainty of a measured coordinate or diameter where the report
@@ -171,7 +171,9 @@ def compare_report(
     np.divide(measured - predicted, u95, out=en, where=u95 > 0.0)
     numbers = np.stack([predicted, u95_predicted, measured, u95_measured, en], axis=1).tolist()
     return [
-        Measurand(*name, row[0], *(None if np.isnan(number) else number for number in row[1:]))
+        ComparedMeasurand(
+            *name, row[0], *(None if np.isnan(number) else number for number in row[1:])
+        )
         for name, row in zip(names, numbers, strict=True)
     ]
 
@@ -193,7 +195,7 @@ def _hash(document: dict[str, Any]) -> str:
 
 
 def seal_prediction(
-    path: str, scene: Scene, place: Sequence[float], measurands: Sequence[Measurand]
+    path: str, scene: Scene, place: Sequence[float], measurands: Sequence[ComparedMeasurand]
 ) -> Seal:
     """Build the seal of a prediction, or verify that of an existing file, which is kept."""
 
@@ -238,7 +240,7 @@ class ReportComparison(Result):
     """A report beside its prediction."""
 
     report: InspectionReport
-    measured: list[Measurand]
+    measured: list[ComparedMeasurand]
     scene: Scene
     place: Sequence[float]
     outside: int = 0  # holes beyond the travel
@@ -278,8 +280,8 @@ class ReportComparison(Result):
 
     def comparison_blocks(self) -> Iterator[Block]:
         if self.seal is not None:
-            words = {"written": "predicted report sealed", "verified": "seal verified"}
-            state = words.get(self.seal.state, f"seal {self.seal.state}")
+            states = {"written": "predicted report sealed", "verified": "seal verified"}
+            state = states.get(self.seal.state, f"seal {self.seal.state}")
             yield f"  {state}: {self.seal.file}, SHA-256 {self.seal.sha256[:16]}…"
         compared = [abs(row.en) for row in self.measured if row.en is not None]
         if compared:
@@ -333,7 +335,7 @@ class ReportComparison(Result):
         )
 
 
-def _importance(row: Measurand) -> tuple[bool, float]:
+def _importance(row: ComparedMeasurand) -> tuple[bool, float]:
     """Order by |E_n|, then the shape of the part and the largest differences."""
     if row.en is not None:
         return False, -abs(row.en)

@@ -42,9 +42,14 @@ def coverage_factor(dof: float) -> float:
     """Compute the coverage factor k of U95 = k · u: 2 for infinite degrees of freedom."""
     if np.isinf(dof):
         return 2.0
+    return float(t_quantile(0.5 + COVERAGE / 2.0, max(dof, 1.0)))
+
+
+def t_quantile(probability: float, dof: Array | float) -> Array:
+    """Compute the quantile of Student's t at a probability, for each number of degrees, [...]."""
     from scipy.stats import t
 
-    return float(t.ppf(0.5 + COVERAGE / 2.0, max(dof, 1.0)))
+    return np.asarray(t.ppf(probability, dof), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)

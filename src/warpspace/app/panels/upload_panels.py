@@ -393,8 +393,8 @@ class ProgramPanel(SceneOverlayPanel):
     def result_html(self, result: description.Result) -> Markup:
         *tables, worst = (block for block in result.blocks() if isinstance(block, Table))
         line, *columns = worst.columns
-        shown = ("|E|", "largest contributions")
-        columns = (replace(column, shows=column.heading in shown) for column in columns)
+        headings = ("|E|", "largest contributions")
+        columns = (replace(column, shows=column.heading in headings) for column in columns)
         narrow = replace(worst, columns=(replace(line, form=HTML.line_link), *columns))
         return block_html(narrow) + details_html((*tables, worst))
 
