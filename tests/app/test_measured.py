@@ -12,6 +12,8 @@ from app.parts import Alone
 from warpspace.analysis.registry import entries
 from warpspace.app.browser import actions as do
 from warpspace.app.documents.scene_file import settings_line, with_settings
+from warpspace.app.drawing.around import draw_surroundings
+from warpspace.app.drawing.labels import point_labels
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.panels import measurement
@@ -351,6 +353,36 @@ def test_a_file_that_does_not_say_its_axis_or_format_asks_in_the_words_of_the_pa
         column.part.parse("nothing.bin", b"\0\1\2")()
 
 
+def guides_of(column):
+    """Return the ends of the highlighted guides, in mm, in the order of their places."""
+    shape = draw_surroundings(LIVE.evaluate(column.state)).get("/diagnosis/guides")
+    ends = [] if shape is None else np.round(shape.assigned["points"], 3)
+    return {tuple(sorted(tuple(place) for place in pair)) for pair in np.array(ends).tolist()}
+
+
+def labels_of(column):
+    return {label.text for label in point_labels(LIVE.evaluate(column.state))}
+
+
+def test_the_likeliest_element_is_drawn_while_its_result_is_current_and_the_section_open():
+    column = diagnose()
+    assert not guides_of(column)
+    column.do(do.SetOption("diagnose", "symptoms", "taper 0.03 on 300 along Z across Y"))
+    column.run()
+    cause = column.part.outcome.result.likeliest
+    assert cause is column.part.outcome.result.causes[0]
+    assert cause.element_words in labels_of(column)
+    assert len(guides_of(column)) == len(cause.axes) > 0
+    current = column.state
+    for elsewhere in ({"task": "design"}, {"open": frozenset()}):
+        closed = replace(current, page=replace(current.page, **elsewhere))
+        assert not draw_surroundings(LIVE.evaluate(closed)).get("/diagnosis/guides")
+    column.do(do.SetOption("diagnose", "symptoms", "taper 0.03 on 200 along Z across Y"))
+    assert column.html
+    assert column.state.page.cause is None
+    assert not guides_of(column)
+
+
 def diagnose():
     state = replace(start_state(load_scene("machine_c_frame_mill")), nodes=5)
     entry = next(one for one in entries() if one.name == "diagnose")
@@ -366,6 +398,9 @@ def test_a_symptom_and_a_file_are_diagnosed_on_the_page():
     column.do(do.SetOption("diagnose", "symptoms", "step of 60 µm where Y reverses"))
     html = unescape(column.run())
     assert "reversal of Y" in html
+    # Y carries X: its frame stands 280 mm below the origin of R, its travel is ±250 mm
+    assert guides_of(column) == {((0.0, -250.0, -280.0), (0.0, 250.0, -280.0))}
+    assert "drive of Y" in labels_of(column)
     assert "drive of Y" in html
     assert "Apply" not in html
     # the file that only a stated kind can be read by

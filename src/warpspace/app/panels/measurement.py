@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 from markupsafe import Markup
@@ -354,6 +354,23 @@ class DiagnosePanel(FilesPanel):
 
     def inputs(self, state: AppState) -> Mapping[str, Any]:
         return {"files": self.files}
+
+    def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
+        return (*super().body_dependencies(picture), picture.state.page.cause)
+
+    def body(self, picture: LivePicture) -> Markup:
+        if self._with_cause(picture.state) is not picture.state:
+            self.context.post(self._with_cause)
+        return super().body(picture)
+
+    def _with_cause(self, state: AppState) -> AppState:
+        """Select the cause whose element is drawn: the likeliest, while the result is current."""
+        cause = None
+        if self.outcome is not None and self.outcome.key == self.result_key(state):
+            cause = cast("Diagnosis", self.outcome.result).likeliest
+        if cause == state.page.cause:
+            return state
+        return replace(state, page=replace(state.page, cause=cause))
 
     def before_result(self, state: AppState) -> Markup:
         return join((self.files_html(), HTML.upload("Add readings …", self.name, MOST_BYTES)))

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from warpspace.analysis.act_planning import Act
 from warpspace.app.state.leaf import Span, describe, described, error_names
+from warpspace.diagnosis.diagnose import CauseGroup
 from warpspace.field.grid import slice_ranges
 from warpspace.machine import limits
 from warpspace.machine.definition import Vector
@@ -191,6 +192,7 @@ class PageLook:
     author: str = described("", "Your name", hint="Kept in this browser", linked="")
     questions: str = described("", "Open questions", kind="lines", hint="One per line", linked="")
     acts: tuple[Act, ...] = field(default=(), metadata=describe("Acts drawn on adjusters"))
+    cause: CauseGroup | None = field(default=None, metadata=describe("Cause drawn at its element"))
 
 
 # --- Ranges and positions of the axes -------------------------------------------------------------
