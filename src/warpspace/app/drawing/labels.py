@@ -199,9 +199,9 @@ def _point(picture: LivePicture) -> Iterator[Label]:
 
 
 def _diagnosed(picture: LivePicture) -> Iterator[Label]:
-    cause, guides = picture.state.page.cause, diagnosed_guides(picture)
-    if cause is not None and len(guides):
-        yield Label(cause.element_words, guides[0].mean(axis=0))
+    element, guides = picture.state.page.element, diagnosed_guides(picture)
+    if element is not None and len(guides):
+        yield Label(element.text, guides[0].mean(axis=0), "measured")
 
 
 def _measured(picture: LivePicture) -> Iterator[Label]:

@@ -61,10 +61,10 @@ def diagnosed_guides(picture: LivePicture) -> Array:
 
     A linear guide runs through the origin of its frame over the travel of its axis.
     """
-    state, cause = picture.state, picture.state.page.cause
+    state, element = picture.state, picture.state.page.element
     is_open = Diagnose.name in state.page.open and state.page.task == Diagnose.task
     ends = [np.zeros((0, 2, 3))]
-    for name in cause.axes if cause is not None and is_open else ():
+    for name in element.axes if element is not None and is_open else ():
         scene, half = state.scene, AXIS_HALF * picture.size_mm
         at = complete_coordinates(scene.machine, standing(state)[0])
         side = "tool" if name in scene.machine.chain.tool else "workpiece"

@@ -28,6 +28,7 @@ from warpspace.app.panels.panel import Context, Jobs, on, with_section
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import TEST, with_form
+from warpspace.app.state.look import DiagnosedElement
 from warpspace.bench.base import BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table as parse_test
 from warpspace.calibration.calibrate import Calibrate
@@ -356,21 +357,22 @@ class DiagnosePanel(FilesPanel):
         return {"files": self.files}
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
-        return (*super().body_dependencies(picture), picture.state.page.cause)
+        return (*super().body_dependencies(picture), picture.state.page.element)
 
     def body(self, picture: LivePicture) -> Markup:
-        if self._with_cause(picture.state) is not picture.state:
-            self.context.post(self._with_cause)
+        if self._with_element(picture.state) is not picture.state:
+            self.context.post(self._with_element)
         return super().body(picture)
 
-    def _with_cause(self, state: AppState) -> AppState:
-        """Select the cause whose element is drawn: the likeliest, while the result is current."""
+    def _with_element(self, state: AppState) -> AppState:
+        """Highlight the element of the likeliest cause while the result is current."""
         cause = None
         if self.outcome is not None and self.outcome.key == self.result_key(state):
             cause = cast("Diagnosis", self.outcome.result).likeliest
-        if cause == state.page.cause:
+        element = DiagnosedElement(cause.element_words, cause.axes) if cause else None
+        if element == state.page.element:
             return state
-        return replace(state, page=replace(state.page, cause=cause))
+        return replace(state, page=replace(state.page, element=element))
 
     def before_result(self, state: AppState) -> Markup:
         return join((self.files_html(), HTML.upload("Add readings …", self.name, MOST_BYTES)))

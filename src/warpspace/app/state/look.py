@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 
 from warpspace.analysis.act_planning import Act
 from warpspace.app.state.leaf import Span, describe, described, error_names
-from warpspace.diagnosis.diagnose import CauseGroup
 from warpspace.field.grid import slice_ranges
 from warpspace.machine import limits
 from warpspace.machine.definition import Vector
@@ -165,6 +164,14 @@ class DisplayOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class DiagnosedElement:
+    """The machine element of the likeliest cause."""
+
+    text: str
+    axes: tuple[str, ...]  # whose guides are drawn
+
+
+@dataclass(frozen=True, slots=True)
 class PageLook:
     task: str = described("understand", "Task", choices=TASKS, linked="")
     open: frozenset[str] = described(
@@ -192,7 +199,7 @@ class PageLook:
     author: str = described("", "Your name", hint="Kept in this browser", linked="")
     questions: str = described("", "Open questions", kind="lines", hint="One per line", linked="")
     acts: tuple[Act, ...] = field(default=(), metadata=describe("Acts drawn on adjusters"))
-    cause: CauseGroup | None = field(default=None, metadata=describe("Cause drawn at its element"))
+    element: DiagnosedElement | None = field(default=None, metadata=describe("Highlighted element"))
 
 
 # --- Ranges and positions of the axes -------------------------------------------------------------
