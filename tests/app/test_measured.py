@@ -20,10 +20,13 @@ from warpspace.app.panels import measurement
 from warpspace.app.panels.error_list import origin_words
 from warpspace.app.panels.upload_panels import ImportPanel
 from warpspace.app.state.app_state import start_state
+from warpspace.app.state.look import DiagnosedElement
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put
 from warpspace.bench.base import bench_names
 from warpspace.calibration.calibrate import Calibrate
+from warpspace.diagnosis.causes import CauseSet
+from warpspace.diagnosis.diagnose import Explanations
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
 from warpspace.resources import find_data
 from warpspace.scene.library import load_scene
@@ -385,6 +388,27 @@ def test_the_likeliest_element_is_drawn_while_its_result_is_current_and_the_sect
     assert column.html
     assert column.state.page.element is None
     assert not guides_of(column)
+
+
+@pytest.mark.parametrize(
+    ("key", "axes"), [("EC0X", ("X", "Y")), ("EA0Z", ("Z",)), ("EAY", ("Y",)), ("bent plate", ())]
+)
+def test_a_joint_has_both_of_its_guides_and_an_artefact_has_none(key, axes):
+    # X stands on Y, which stands on the bed as Z does; both bed joints have a single guide
+    causes = CauseSet(load_scene("machine_c_frame_mill"))
+    explanations = Explanations(causes, None, None, ())
+    assert tuple(explanations._find_axes(key)) == axes
+
+
+def test_guides_run_through_the_origins_of_their_frames():
+    # Z: (0, 560, 560), travel −500 to 0; X: 280 − 100 mm below the origin of R, travel ±400
+    column = diagnose()
+    element = DiagnosedElement("joint", ("X", "Z"))
+    column.store.apply(lambda now: replace(now, page=replace(now.page, element=element)))
+    assert guides_of(column) == {
+        ((-400.0, 0.0, -180.0), (400.0, 0.0, -180.0)),
+        ((0.0, 560.0, 60.0), (0.0, 560.0, 560.0)),
+    }
 
 
 def diagnose():
