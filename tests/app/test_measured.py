@@ -12,16 +12,21 @@ from app.parts import Alone
 from warpspace.analysis.registry import entries
 from warpspace.app.browser import actions as do
 from warpspace.app.documents.scene_file import settings_line, with_settings
+from warpspace.app.drawing.around import draw_surroundings
+from warpspace.app.drawing.labels import point_labels
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.panels import measurement
 from warpspace.app.panels.error_list import origin_words
 from warpspace.app.panels.upload_panels import ImportPanel
 from warpspace.app.state.app_state import start_state
+from warpspace.app.state.look import DiagnosedElement
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put
 from warpspace.bench.base import bench_names
 from warpspace.calibration.calibrate import Calibrate
+from warpspace.diagnosis.causes import CauseSet
+from warpspace.diagnosis.diagnose import Explanations
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
 from warpspace.resources import find_data
 from warpspace.scene.library import load_scene
@@ -351,6 +356,61 @@ def test_a_file_that_does_not_say_its_axis_or_format_asks_in_the_words_of_the_pa
         column.part.parse("nothing.bin", b"\0\1\2")()
 
 
+def guides_of(column):
+    """Return the ends of the highlighted guides, in mm, in the order of their places."""
+    shape = draw_surroundings(LIVE.evaluate(column.state)).get("/diagnosis/guides")
+    ends = [] if shape is None else np.round(shape.assigned["points"], 3)
+    return {tuple(sorted(tuple(place) for place in pair)) for pair in np.array(ends).tolist()}
+
+
+def labels_of(column):
+    return {label.text for label in point_labels(LIVE.evaluate(column.state))}
+
+
+def test_the_likeliest_element_is_drawn_while_its_result_is_current_and_the_section_open():
+    column = diagnose()
+    assert not guides_of(column)
+    column.do(do.SetOption("diagnose", "symptoms", "taper 0.03 on 300 along Z across Y"))
+    column.run()
+    cause = column.part.outcome.result.likeliest
+    assert cause is column.part.outcome.result.causes[0]
+    assert cause.element_words in labels_of(column)
+    assert len(guides_of(column)) == len(cause.axes) > 0
+    current = column.state
+    for elsewhere in ({"task": "design"}, {"open": frozenset()}):
+        closed = replace(current, page=replace(current.page, **elsewhere))
+        assert not draw_surroundings(LIVE.evaluate(closed)).get("/diagnosis/guides")
+    again = diagnose()  # another run of the same readings selects an equal element
+    again.do(do.SetOption("diagnose", "symptoms", "taper 0.03 on 300 along Z across Y"))
+    again.run()
+    assert again.state.page == current.page
+    column.do(do.SetOption("diagnose", "symptoms", "taper 0.03 on 200 along Z across Y"))
+    assert column.html
+    assert column.state.page.element is None
+    assert not guides_of(column)
+
+
+@pytest.mark.parametrize(
+    ("key", "axes"), [("EC0X", ("X", "Y")), ("EA0Z", ("Z",)), ("EAY", ("Y",)), ("bent plate", ())]
+)
+def test_a_joint_has_both_of_its_guides_and_an_artefact_has_none(key, axes):
+    # X stands on Y, which stands on the bed as Z does; both bed joints have a single guide
+    causes = CauseSet(load_scene("machine_c_frame_mill"))
+    explanations = Explanations(causes, None, None, ())
+    assert tuple(explanations._find_axes(key)) == axes
+
+
+def test_guides_run_through_the_origins_of_their_frames():
+    # Z: (0, 560, 560), travel −500 to 0; X: 280 − 100 mm below the origin of R, travel ±400
+    column = diagnose()
+    element = DiagnosedElement("joint", ("X", "Z"))
+    column.store.apply(lambda now: replace(now, page=replace(now.page, element=element)))
+    assert guides_of(column) == {
+        ((-400.0, 0.0, -180.0), (400.0, 0.0, -180.0)),
+        ((0.0, 560.0, 60.0), (0.0, 560.0, 560.0)),
+    }
+
+
 def diagnose():
     state = replace(start_state(load_scene("machine_c_frame_mill")), nodes=5)
     entry = next(one for one in entries() if one.name == "diagnose")
@@ -366,6 +426,9 @@ def test_a_symptom_and_a_file_are_diagnosed_on_the_page():
     column.do(do.SetOption("diagnose", "symptoms", "step of 60 µm where Y reverses"))
     html = unescape(column.run())
     assert "reversal of Y" in html
+    # Y carries X: its frame stands 280 mm below the origin of R, its travel is ±250 mm
+    assert guides_of(column) == {((0.0, -250.0, -280.0), (0.0, 250.0, -280.0))}
+    assert "drive of Y" in labels_of(column)
     assert "drive of Y" in html
     assert "Apply" not in html
     # the file that only a stated kind can be read by

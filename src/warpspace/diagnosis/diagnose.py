@@ -162,11 +162,19 @@ class CauseGroup:
     remedy: str
     title: str = field(metadata=NO_JSON)
     summary: str = field(default="", metadata=NO_JSON)  # of causes that are not listed by name
+    # of the element: one, or both that a joint connects; none of an artefact
+    axes: tuple[str, ...] = field(default=(), metadata=NO_JSON)
 
     @property
     def single_causes(self) -> list[str]:
         """The other causes that explain the readings alone."""
         return [causes[0] for causes in self.group if len(causes) == 1]
+
+    @property
+    def element_words(self) -> str:
+        """The element, and the number of causes that are not separated from its own."""
+        count = len(self.single_causes)
+        return self.element + f" or {count} more" * (count > 0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,6 +193,14 @@ class Diagnosis(Result):
     disturbed: str  # likeliest disturbed file
     gained_bits: float
     notes: tuple[str, ...]
+
+    @property
+    def likeliest(self) -> CauseGroup | None:
+        """The first cause, if the readings reveal it and no other explanation is likelier."""
+        first = self.causes[0]
+        is_hidden = first.summary or self.gained_bits < MIN_GAIN_BITS
+        others = max(self.not_geometric, self.within_tolerance)
+        return None if is_hidden or first.probability < others else first
 
     def blocks(self) -> Iterator[Block]:
         yield f"{self.title} · {'; '.join(self.sources)}"
@@ -269,6 +285,7 @@ class Explanations:
             remedy=" ".join(dict.fromkeys(remedy for _, remedy in remedies)),
             title=" and ".join(cause.title for cause in causes[0]),
             summary="" if is_seen else f"{len(group)} without effect on these readings",
+            axes=tuple(dict.fromkeys(axis for name in names[0] for axis in self._find_axes(name))),
         )
 
     def _find_remedy(self, name: str) -> tuple[str, str]:
@@ -277,11 +294,22 @@ class Explanations:
         if " " in name:
             element, remedy = next(row for start, row in remedies.items() if name.startswith(start))
             return element.format(axis=name.rpartition(" ")[2]), remedy
-        row, chain = parameter(name), self.set.scene.machine.chain
-        branch = chain.tool if row.axis in chain.tool else chain.workpiece
-        carrier = ("bed", *branch)[branch.index(row.axis)]
+        row = parameter(name)
         element, remedy = remedies[row.name.partition(" of ")[0]]
-        return f"{element.format(axis=row.axis, carrier=carrier)}: {row.name}", remedy
+        words = element.format(axis=row.axis, carrier=self._find_carrier(row.axis))
+        return f"{words}: {row.name}", remedy
+
+    def _find_carrier(self, axis: str) -> str:
+        chain = self.set.scene.machine.chain
+        branch = chain.tool if axis in chain.tool else chain.workpiece
+        return ("bed", *branch)[branch.index(axis)]
+
+    def _find_axes(self, name: str) -> list[str]:
+        """Find the axes of the element that has a cause: two if it is a joint."""
+        axes = [name.rpartition(" ")[2]] if " " in name else [parameter(name).axis]
+        if " " not in name and parameter(name).is_constant:
+            axes.append(self._find_carrier(*axes))
+        return [axis for axis in axes if axis in self.set.scene.machine.axes]
 
     def _find_test(self, causes: Causes) -> ProposedTest | None:
         """Find the test with the most information per minute on whether these are the causes."""

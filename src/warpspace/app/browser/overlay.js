@@ -196,8 +196,9 @@
       <text x="${(36 * x).toFixed(1)}" y="${(36 * y).toFixed(1)}">${name}</text></g>`).join("");
   };
 
-  // the selected trace and measured distances are never hidden by the box
-  const FORWARD = ["/traces/actual", "/traces/nominal", "/measured/nominal", "/measured/actual", "/measured/points"];
+  // the selected trace, measured distances and a diagnosed element are never hidden by the box
+  const FORWARD = ["/traces/actual", "/traces/nominal", "/measured/nominal", "/measured/actual", "/measured/points",
+    "/diagnosis/guides"];
   const bringForward = () => {
     for (const name of FORWARD)
       warpspaceViser.node(name)?.traverse(piece => {

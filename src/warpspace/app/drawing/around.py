@@ -21,7 +21,12 @@ from warpspace.app.drawing.shapes import (
     polylines,
 )
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine_bodies import chosen_trace, points_on_traces
+from warpspace.app.evaluation.machine_bodies import (
+    AXIS_HALF,
+    chosen_trace,
+    diagnosed_guides,
+    points_on_traces,
+)
 from warpspace.app.evaluation.point_explanation import explain_point, measure_distance
 from warpspace.app.evaluation.scene_overlays import AT_LINE, planned_adjusters
 from warpspace.formats.source import MAX_LINES
@@ -35,8 +40,7 @@ from warpspace.units import MM_PER_UM, Array
 HEAD, BALL = 0.034, 0.009  # of an arrow, and the marker of the worst point
 APART = 0.002  # distance from which both the nominal and the actual trace are drawn
 TURNED = 0.014  # diameter of a traced point while the table rotates
-POINT_MARKER, AXIS_HALF, DASH = 0.011, 0.32, 0.02
-"""Marker of the picked point, half length of the axis of rotation, dash of the lever."""
+POINT_MARKER, DASH = 0.011, 0.02  # marker of the picked point, dash of the lever
 RESIDUAL_HEAD, LONGEST_RESIDUAL = 0.025, 0.2
 ADJUSTER = 0.12  # length of the arrow of an adjuster
 MOST_OUTSIDE, OUTSIDE = 4000, 0.006  # marked points beyond the travel, and their size
@@ -57,8 +61,8 @@ def draw_surroundings(picture: LivePicture) -> Shapes:
     """Draw everything of a picture except the box and the machine."""
     if picture.is_rotary:
         return _rotary_traces(picture)
-    draws = (_axes, _traces, _path, _part, _program, _other_side, _point, _adjusters, _measured,
-             _marks, _uncertainty)  # fmt: skip
+    draws = (_axes, _traces, _path, _part, _program, _other_side, _point, _adjusters, _diagnosed,
+             _measured, _marks, _uncertainty)  # fmt: skip
     return {name: shape for draw in draws for name, shape in draw(picture).items()}
 
 
@@ -197,6 +201,10 @@ def _adjusters(picture: LivePicture) -> Shapes:
     )
     pieces = arrows(start, start + ADJUSTER * picture.size_mm * along, HEAD * picture.size_mm)
     return {"/adjusters/arrows": lines(pieces, ACCENT, 3.0)}
+
+
+def _diagnosed(picture: LivePicture) -> Shapes:
+    return {"/diagnosis/guides": lines(diagnosed_guides(picture), ACCENT, 6.0)}
 
 
 def _measured(picture: LivePicture) -> Shapes:

@@ -10,7 +10,7 @@ from viser import ClientHandle
 from warpspace.app.drawing.labels import axes_room_mm
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine_bodies import drawn_bodies
+from warpspace.app.evaluation.machine_bodies import diagnosed_guides, drawn_bodies
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.picture import model
@@ -153,7 +153,8 @@ def focus(state: AppState) -> tuple[object, ...]:
 
 def _drawn_mm(picture: LivePicture) -> Array:
     if not picture.is_rotary:
-        return picture.drawn_mm
+        points = (picture.drawn_mm, diagnosed_guides(picture))
+        return np.concatenate([at.reshape(-1, 3) for at in points])
     traces = (of.actual_mm.reshape(-1, 3) for of in picture.traces)
     return np.concatenate([np.zeros((0, 3)), *traces])
 
@@ -204,7 +205,7 @@ class TabCamera:
         if picture.state.machine.shown:
             bodies = drawn_bodies(picture, nominal=True)
             room = [picture.grid.bounds_mm, *(part.vertices_mm for part in bodies)]
-        return np.concatenate([*room, picture.drawn_mm.reshape(-1, 3)])
+        return np.concatenate([*room, _drawn_mm(picture)])
 
     @property
     def room(self) -> Room:

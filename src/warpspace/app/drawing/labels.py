@@ -10,7 +10,12 @@ from functools import lru_cache
 import numpy as np
 
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine_bodies import chosen_trace, drawn_bodies, tool_point
+from warpspace.app.evaluation.machine_bodies import (
+    chosen_trace,
+    diagnosed_guides,
+    drawn_bodies,
+    tool_point,
+)
 from warpspace.app.evaluation.point_explanation import drawn_places, explain_point, measure_distance
 from warpspace.app.evaluation.scene_overlays import planned_adjusters
 from warpspace.app.state.app_state import Picked
@@ -132,7 +137,8 @@ def point_labels(picture: LivePicture) -> list[Label]:
         if same_text and distance < TICK * picture.size_mm:
             worst = []
     acts = [Label(text, at) for text, at, _ in planned_adjusters(picture.state) if text]
-    return [*worst, *point, *acts, *_measured(picture), *_names(picture), *_corners(picture)]
+    others = (*_diagnosed(picture), *_measured(picture), *_names(picture), *_corners(picture))
+    return [*worst, *point, *acts, *others]
 
 
 def trace_label(picture: LivePicture, line: TraceLine) -> str:
@@ -190,6 +196,12 @@ def _point(picture: LivePicture) -> Iterator[Label]:
         yield Label(f"{part.key} {relation} this axis", origin, "asked")
         lever = float(np.linalg.norm(part.lever_mm))
         yield Label(f"lever {lever:.0f} mm", point + LEVER_AT * (origin - point), "asked")
+
+
+def _diagnosed(picture: LivePicture) -> Iterator[Label]:
+    element, guides = picture.state.page.element, diagnosed_guides(picture)
+    if element is not None and len(guides):
+        yield Label(element.text, guides[0].mean(axis=0), "measured")
 
 
 def _measured(picture: LivePicture) -> Iterator[Label]:

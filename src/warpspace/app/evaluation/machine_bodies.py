@@ -9,12 +9,14 @@ from warpspace.app.evaluation.point_explanation import drawn_field
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_positions
 from warpspace.bodies.placed import PlacedBody, place_bodies, turning_frames
+from warpspace.diagnosis.diagnose import Diagnose
 from warpspace.geometry.surfaces import deform
-from warpspace.kinematics.chain import nominal_point
+from warpspace.kinematics.chain import branch_frames, nominal_point
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.units import Array
 
 NO_POSITIONS: Mapping[str, float] = {}
+AXIS_HALF = 0.32  # half length of a drawn axis of rotation, relative to the longest edge of the box
 
 
 def standing(
@@ -52,6 +54,26 @@ def tool_point(picture: LivePicture) -> tuple[Array, Array]:
     axes, nominal = standing(state)
     _, field = drawn_field(state, complete_coordinates(state.scene.machine, axes))
     return deform(nominal, field.error_um, picture.exaggeration), field.error_um
+
+
+def diagnosed_guides(picture: LivePicture) -> Array:
+    """Find the guides of the diagnosed element while *What is wrong?* is open, [n, 2, 3], mm.
+
+    A linear guide runs through the origin of its frame over the travel of its axis.
+    """
+    state, element = picture.state, picture.state.page.element
+    is_open = Diagnose.name in state.page.open and state.page.task == Diagnose.task
+    ends = [np.zeros((0, 2, 3))]
+    for name in element.axes if element is not None and is_open else ():
+        scene, half = state.scene, AXIS_HALF * picture.size_mm
+        at = complete_coordinates(scene.machine, standing(state)[0])
+        side = "tool" if name in scene.machine.chain.tool else "workpiece"
+        frames = branch_frames(scene.model, side, at)
+        axis, before = next((of.axis, of.before) for of in frames if of.axis.name == name)
+        low, high = axis.travel if axis.is_linear else (-half, half)
+        along = axis.direction * before[:3, axis.index]
+        ends.append((before[:3, 3] + np.outer((low, high), along))[None])
+    return np.concatenate(ends)
 
 
 # --- The animated axis, its traced points, and the selected trace ---------------------------------

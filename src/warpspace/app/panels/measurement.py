@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 from markupsafe import Markup
@@ -28,6 +28,7 @@ from warpspace.app.panels.panel import Context, Jobs, on, with_section
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import TEST, with_form
+from warpspace.app.state.look import DiagnosedElement
 from warpspace.bench.base import BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table as parse_test
 from warpspace.calibration.calibrate import Calibrate
@@ -354,6 +355,24 @@ class DiagnosePanel(FilesPanel):
 
     def inputs(self, state: AppState) -> Mapping[str, Any]:
         return {"files": self.files}
+
+    def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
+        return (*super().body_dependencies(picture), picture.state.page.element)
+
+    def body(self, picture: LivePicture) -> Markup:
+        if self._with_element(picture.state) is not picture.state:
+            self.context.post(self._with_element)
+        return super().body(picture)
+
+    def _with_element(self, state: AppState) -> AppState:
+        """Highlight the element of the likeliest cause while the result is current."""
+        cause = None
+        if self.outcome is not None and self.outcome.key == self.result_key(state):
+            cause = cast("Diagnosis", self.outcome.result).likeliest
+        element = DiagnosedElement(cause.element_words, cause.axes) if cause else None
+        if element == state.page.element:
+            return state
+        return replace(state, page=replace(state.page, element=element))
 
     def before_result(self, state: AppState) -> Markup:
         return join((self.files_html(), HTML.upload("Add readings …", self.name, MOST_BYTES)))

@@ -164,6 +164,14 @@ class DisplayOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class DiagnosedElement:
+    """The machine element of the likeliest cause."""
+
+    text: str
+    axes: tuple[str, ...]  # whose guides are drawn
+
+
+@dataclass(frozen=True, slots=True)
 class PageLook:
     task: str = described("understand", "Task", choices=TASKS, linked="")
     open: frozenset[str] = described(
@@ -191,6 +199,7 @@ class PageLook:
     author: str = described("", "Your name", hint="Kept in this browser", linked="")
     questions: str = described("", "Open questions", kind="lines", hint="One per line", linked="")
     acts: tuple[Act, ...] = field(default=(), metadata=describe("Acts drawn on adjusters"))
+    element: DiagnosedElement | None = field(default=None, metadata=describe("Highlighted element"))
 
 
 # --- Ranges and positions of the axes -------------------------------------------------------------
