@@ -28,7 +28,7 @@ from warpspace.calibration.calibrate import Calibrate
 from warpspace.diagnosis.causes import CauseSet
 from warpspace.diagnosis.diagnose import Explanations
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
-from warpspace.resources import find_data
+from warpspace.resources import assets_dir, find_data
 from warpspace.scene.library import load_scene
 
 STATE = start_state(load_scene("dvf5000_first"), nodes=5)
@@ -451,3 +451,25 @@ def test_a_symptom_and_a_file_are_diagnosed_on_the_page():
     column.do(do.Upload("diagnose", HOSTILE, 10_000_000, ""))
     assert "9.5 MB" in column.html
     assert HOSTILE not in column.html
+
+
+@pytest.mark.parametrize("name", ["calibrate", "diagnose"])
+def test_a_report_is_read_at_the_place_that_the_form_states(name):
+    kinds = {"calibrate": measurement.CalibratePanel, "diagnose": measurement.DiagnosePanel}
+    state = replace(start_state(load_scene("dvf5000_nominal")), nodes=5)
+    column = Column(kinds[name], state, next(one for one in entries() if one.name == name))
+    report = (assets_dir() / "measurements/simulated_plates/plate_1.txt").read_bytes()
+    with pytest.raises(OptionError, match="expected X,Y,Z where the part was clamped"):
+        column.part.parse("plate_1.txt", report)
+    column.do(do.SetOption(name, "place", "10,0,120"))
+    assert column.part.placed_scene().part.place == (10.0, 0.0, 120.0, 0.0, 0.0, 0.0)
+    column.part.parse("plate_1.txt", report)()
+    assert [file.kind or file.count for file in column.part.files] == [60]
+    if name == "calibrate":
+        column.run()
+        given = Calibrate(data=("plate_1.txt",), place=(10.0, 0.0, 120.0), next_count=3)
+        expected = given.run(column.state.scene, lambda _: None)
+        for ours, theirs in zip(
+            column.part.outcome.result.parameters, expected.parameters, strict=True
+        ):
+            assert ours.value == pytest.approx(theirs.value, rel=1e-9)

@@ -38,6 +38,7 @@ from warpspace.calibration.registry import KINDS, parse_readings
 from warpspace.diagnosis.diagnose import Diagnose, Diagnosis
 from warpspace.diagnosis.symptoms import FORMS
 from warpspace.exceptions import OptionError
+from warpspace.parts.workpiece import place_part
 from warpspace.resources import find_data
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import decode_text
@@ -78,6 +79,15 @@ class FilesPanel(AnalysisPanel):
 
     def set_files(self, files: tuple[UploadedFile, ...]) -> None:
         self.files = files
+
+    def placed_scene(self) -> Scene:
+        """Return the scene with its part where the option `place` states it."""
+        state = self.context.state
+        place, text = (
+            next(o for o in self.options() if o.name == "place"),
+            self.values(state).get("place", ""),
+        )
+        return place_part(state.active_scene(), place.read(text, state.scene) if text else None)
 
     def files_html(self) -> Markup:
         return HTML.files(self.name, self.files, self._upload_problem, self._uploads.html())
@@ -199,7 +209,9 @@ class CalibrateTexts(Calibrate):
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> Calibration:
         reading_sets = [
-            parse_readings(file.content, file.name, scene, file.kind, self.frame)
+            parse_readings(
+                file.content, file.name, place_part(scene, self.place), file.kind, self.frame
+            )
             for file in self.files
         ]
         return self.fit_readings(scene, reading_sets, (), lambda: watch(0.0))
@@ -282,7 +294,7 @@ class CalibratePanel(FilesPanel):
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
         text, _ = decode_text(content, name)
-        scene, kind, files = self.context.state.active_scene(), self._next_kind, self.files
+        scene, kind, files = self.placed_scene(), self._next_kind, self.files
         uploaded = read_uploaded(scene, text, name, kind or None, files)
         return partial(self.set_files, (*files, uploaded))
 
@@ -339,7 +351,8 @@ class DiagnoseTexts(Diagnose):
     files: tuple[UploadedFile, ...] = ()
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> Diagnosis:
-        parsed = (parse_readings(f.content, f.name, scene, f.kind) for f in self.files)
+        placed = place_part(scene, self.place)
+        parsed = (parse_readings(f.content, f.name, placed, f.kind) for f in self.files)
         return self.diagnose(list(parsed), scene, watch)
 
 
@@ -382,5 +395,5 @@ class DiagnosePanel(FilesPanel):
         kinds = self.values(self.context.state).get("kinds", "").split()
         kind = kinds[min(len(self.files), len(kinds) - 1)] if kinds else None
         text, _ = decode_text(content, name)
-        scene, files = self.context.state.active_scene(), self.files
-        return partial(self.set_files, (*files, read_uploaded(scene, text, name, kind, files)))
+        uploaded = read_uploaded(self.placed_scene(), text, name, kind, self.files)
+        return partial(self.set_files, (*self.files, uploaded))
