@@ -106,7 +106,8 @@ def test_every_section_of_a_task_has_its_words():
     assert len(found) > len(TASKS)
     for one in found:
         part = re.search(rf"(?ms)^## {TASKS[one.task]}\n(.*?)(?=^## )", text)
-        titled = re.search(rf"(?ms)(?:^### {one.title}$|\*\*{one.title}\*\*)(.*)", part[1])
+        title = re.escape(one.title)
+        titled = re.search(rf"(?ms)(?:^### {title}$|\*\*{title}\*\*)(.*)", part[1])
         assert titled, f"docs/app.md, {TASKS[one.task]}, has no {one.title}: say what it does"
         words = re.split(r"(?m)^###|\*\*", titled[1], maxsplit=1)[0].split()
         assert len(words) >= WORDS_OF_A_SECTION, f"docs/app.md, {one.title}: say what it does"
