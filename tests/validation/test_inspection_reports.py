@@ -84,11 +84,11 @@ def covered(trials, count, stated, seed=1):
     return shares.mean(axis=1) / trials
 
 
-def test_intervals_of_one_hundred_planted_machines_hold():
-    """300 intervals: 95 % ± 4 (three standard deviations); without the term about one half."""
-    term, without, following = covered(100, 2, stated=False)
-    assert 0.91 <= term <= 0.99
-    assert 0.91 <= following <= 0.99
+def test_intervals_of_forty_planted_machines_hold():
+    """120 intervals: 95 % ± 6 (three standard deviations); without the term about one half."""
+    term, without, following = covered(40, 2, stated=False)
+    assert term >= 0.89
+    assert following >= 0.89
     assert 0.35 <= without <= 0.8
 
 

@@ -153,7 +153,7 @@ def constrain(curves, text):
 
 def test_planted_machines_lie_within_the_ranges(tmp_path):
     scene, rng, within, widths = scene_of(tmp_path, FEW), np.random.default_rng(1), 0, []
-    for _ in range(100):
+    for _ in range(50):
         curves, values, text = planted(scene, rng, 30, 0.5)
         try:
             ranges = constrain(curves, text).find_ranges((), ignore_progress)
@@ -162,7 +162,7 @@ def test_planted_machines_lie_within_the_ranges(tmp_path):
         low, high = (np.array([ranges[key][end] for key, _ in curves.variables]) for end in (0, 1))
         within += bool(np.all((low - 1e-6 <= values) & (values <= high + 1e-6)))
         widths.append(ranges["EC0Y"][1] - ranges["EC0Y"][0])
-    assert within >= 95
+    assert within >= 0.95 * 50
     assert np.mean(widths) < 0.75 * 60.0  # the readings say something
 
 
@@ -301,15 +301,20 @@ def further_tests(tmp_path, entries, tolerances=FEW):
     return curves, constraints, FurtherTests(curves, tests, constraints, ignore_progress)
 
 
+def keep(further, numbers):
+    """Restrict the further tests to a few."""
+    further.tests = [further.tests[number] for number in numbers]
+    further.constraints = [further.constraints[number] for number in numbers]
+    further.passing, further.minutes = further.passing[numbers], further.minutes[numbers]
+
+
 @pytest.mark.parametrize("share", [0.9, 0.75, 0.6])
 def test_smallest_set_is_that_of_an_exhaustive_search(tmp_path, share):
     curves, constraints, further = further_tests(tmp_path, [LINES[0], LINES[3]])
     worst = curves.find_largest(constraints, ignore_progress)
     fails = [n for n, each in enumerate(further.constraints) if not passes(worst.machine, each)]
     few = [*fails[:8], 0]
-    further.tests = [further.tests[number] for number in few]
-    further.constraints = [further.constraints[number] for number in few]
-    further.passing = further.passing[few]
+    keep(further, few)
     further.minutes = np.linspace(30.0, 10.0, len(few))
     limit_um = share * worst.low_um
     chosen = further.find_smallest_set(limit_um)
@@ -334,6 +339,7 @@ def test_smallest_set_is_that_of_an_exhaustive_search(tmp_path, share):
 def test_the_first_further_test_is_that_of_a_search_through_all(tmp_path):
     curves, constraints, further = further_tests(tmp_path, [*CIRCLES[:1], LINES[0], LINES[3]])
     worst = curves.find_largest(constraints, ignore_progress)
+    keep(further, [*range(0, len(further.tests), 3)])
     (step,) = further.find_next(worst, 1)
     left_um = [
         curves.find_largest([*constraints, each], ignore_progress).low_um
@@ -347,17 +353,18 @@ def test_the_first_further_test_is_that_of_a_search_through_all(tmp_path):
     assert (rates < 0.9 * rates.max()).any()
 
 
-def test_factor_of_the_limits_is_the_largest(tmp_path):
+@pytest.mark.parametrize("knots", [3, pytest.param(5, marks=pytest.mark.nightly)])
+def test_factor_of_the_limits_is_the_largest(tmp_path, knots):
     """With 1.02 × the factor another solver finds a machine that exceeds the limit."""
     scene = scene_of(tmp_path, TOLERANCES)
     tests = plan_of(scene, CIRCLES + LINES + DIAGONALS)
     limit_um = 70.0
-    result = find_worst_machine(scene, tests, Acceptance(keep_um=limit_um))
-    check_factor(scene, tests, result.factor, limit_um)
+    result = find_worst_machine(scene, tests, Acceptance(keep_um=limit_um, knots=knots))
+    check_factor(scene, tests, result.factor, limit_um, knots)
 
 
-def check_factor(scene, tests, found, limit_um):
-    curves = ErrorCurves(scene, 5)
+def check_factor(scene, tests, found, limit_um, knots=5):
+    curves = ErrorCurves(scene, knots)
     constraints = [build_constraint(curves, test, ignore_progress) for test in tests]
     assert 0.0 < found < 1.0
 

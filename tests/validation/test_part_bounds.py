@@ -110,11 +110,12 @@ def test_distance_of_two_bores_on_a_diagonal(tmp_path, band, is_kept):
     assert distance.verdict == ("pass" if is_kept else "undecided")
 
 
-def test_no_machine_exceeds_the_bounds_and_the_worst_ones_attain_them(tmp_path):
+@pytest.mark.parametrize("knots", [2, pytest.param(5, marks=pytest.mark.nightly)])
+def test_no_machine_exceeds_the_bounds_and_the_worst_ones_attain_them(tmp_path, knots):
     scene = scene_of(tmp_path, ALL, "".join(SIDES))
     tests = plan_of(scene, CIRCLES + LINES)
-    curves = ErrorCurves(scene)
-    result = find_worst_machine(scene, tests, Acceptance(part=True))
+    curves = ErrorCurves(scene, knots)
+    result = find_worst_machine(scene, tests, Acceptance(part=True, knots=knots))
     assert len(result.measurands) == len(SIDES)
     constraints = [build_constraint(curves, test, ignore_progress) for test in tests]
     polytope, rng = curves.polytope(constraints), np.random.default_rng(4)
