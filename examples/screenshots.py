@@ -59,6 +59,7 @@ run,direction,X [mm],EXX [um],ECX [urad]
 """
 """A file that is imported."""
 SETTLED_MS, PAUSE_MS, PATIENCE_MS = 3000, 400, 60_000
+ZOOM_STEPS = 10  # of the wheel, until the adjusters are in view
 COLOURS, WIDE = 256, 2000  # of a picture; pixels from which on steps of colours are not seen
 
 
@@ -167,6 +168,17 @@ def improved(page: Page) -> None:
     page.get_by_role("button", name="Save table").wait_for()
 
 
+def adjusted(page: Page) -> None:
+    """Preview the best single act, with its arrows at the adjusters of the machine."""
+    open_task(page, "Improve")
+    press(page, "Preview")
+    box = page.locator("#root canvas").first.bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    for _ in range(ZOOM_STEPS):
+        page.mouse.wheel(0, 100)
+        page.wait_for_timeout(PAUSE_MS)
+
+
 def designed(page: Page) -> None:
     """Hold the tolerances against 40 µm."""
     open_task(page, "Design")
@@ -262,9 +274,10 @@ VISITS = {
     "app_phone": Visit(as_opened, size=(390, 844)),
     "app_wide": Visit(as_opened, size=(2560, 1440)),
     "app_compare": Visit(compared),
-    "task_understand": Visit(ask_question),
+    "task_understand": Visit(ask_question, size=(1280, 800)),
     "task_measure": Visit(tested),
-    "task_improve": Visit(improved),
+    "task_improve": Visit(improved, size=(1280, 800)),
+    "task_adjust": Visit(adjusted, size=(1280, 800)),
     "task_design": Visit(designed),
     "task_machine": Visit(turned, "teach_wobbling_table"),
     "rotary_axes": Visit(rotated, "teach_wobbling_table"),

@@ -92,7 +92,7 @@ def cycles(rng, log, *, at_once):
     return MOST_CYCLES
 
 
-@pytest.mark.parametrize("count", [4, pytest.param(500, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("count", [3, pytest.param(500, marks=pytest.mark.nightly)])
 def test_all_acts_at_once_with_learned_stiffness_halve_the_cycles(count, tmp_path):
     log = tmp_path / "log.toml"
     numbers = np.array(
