@@ -8,7 +8,8 @@ import time
 import zlib
 from datetime import UTC, datetime
 
-# Both are read when matplotlib and VTK are first imported.
+# These are read when numpy, matplotlib and VTK are first imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices; several test processes
 os.environ["MPLBACKEND"] = "Agg"
 if sys.platform == "linux":
     os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"

@@ -264,7 +264,7 @@ def hit_and_run(curves, constraints, steps, rng):
         limits.append(np.full(len(block), each.limit / each.form.factor))
     matrix, right = np.concatenate(blocks), np.concatenate(limits)
     both, free = np.concatenate([matrix, -matrix]), [(None, None)] * width
-    costs = rng.normal(size=(40, width)) * (np.arange(width) < count)
+    costs = rng.normal(size=(20, width)) * (np.arange(width) < count)
     vertices = [linprog(c, both, np.tile(right, 2), bounds=free).x for c in costs]
     point = np.mean(vertices, axis=0)
     for _ in range(steps):
