@@ -74,7 +74,7 @@ def test_the_selected_acts_are_drawn_at_their_adjusters_while_the_section_is_ope
     state = replace(START, forms={"adjust.objective": "max", "adjust.grid": "5"})
     state = replace(state, page=replace(state.page, task="improve"))
     ran(part, state)
-    best = part.outcome.result.adjustments[part.offered_changes(part.outcome.result)[-1]]
+    best = part.outcome.result.adjustments[part.offered_changes(part.outcome.result)[0]]
     for update in part.context.posted:
         state = update(state)
     assert state.page.acts == best.acts
@@ -92,8 +92,9 @@ def test_the_selected_acts_are_drawn_at_their_adjusters_while_the_section_is_ope
     assert {str(act) for act in best.acts} <= {label.text for label in point_labels(picture)}
     shapes = draw_surroundings(picture)
     assert len(shapes["/adjusters/arrows"].assigned["points"]) == len(members) * (1 + STROKES)
-    previewed = part.handle(state, do.Preview("adjust", 0))
-    assert previewed.page.acts == part.outcome.result.adjustments[0].acts
+    last = len(part.outcome.result.adjustments) - 1
+    previewed = part.handle(state, do.Preview("adjust", last))
+    assert previewed.page.acts == part.outcome.result.adjustments[last].acts != best.acts
     for elsewhere in ({"task": "design"}, {"open": frozenset()}):
         assert not planned_adjusters(replace(state, page=replace(state.page, **elsewhere)))
 

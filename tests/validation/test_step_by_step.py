@@ -1,6 +1,9 @@
 """Step by step: machines of unknown stiffness reach a limit in half the cycles of single acts."""
 
 from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -13,6 +16,7 @@ from warpspace.machine.errors import Constant, ErrorSet
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import evaluate_grid
 
+MACHINES, BLOCK = 500, 25
 SCENE = """
 [machine]
 chain = "wFXYZt"
@@ -92,16 +96,38 @@ def cycles(rng, log, *, at_once):
     return MOST_CYCLES
 
 
-@pytest.mark.parametrize("count", [3, pytest.param(500, marks=pytest.mark.nightly)])
-def test_all_acts_at_once_with_learned_stiffness_halve_the_cycles(count, tmp_path):
-    log = tmp_path / "log.toml"
-    numbers = np.array(
-        [
-            [cycles(np.random.default_rng(seed), log, at_once=way) for way in (True, False)]
-            for seed in range(count)
-        ]
-    )
+@cache
+def count_cycles(first, last):
+    """Count the cycles of simulated machines, [n, 2]: planned, and one act at a time."""
+    with TemporaryDirectory() as folder:
+        log = Path(folder) / "log.toml"
+        return np.array(
+            [
+                [cycles(np.random.default_rng(seed), log, at_once=way) for way in (True, False)]
+                for seed in range(first, last)
+            ]
+        )
+
+
+def check_cycles(numbers):
     planned, single = numbers.mean(axis=0)
-    print(f"cycles: {planned:.2f} planned, {single:.2f} one act at a time")
+    print(f"{len(numbers)} machines: {planned:.2f} cycles planned, {single:.2f} one act at a time")
     assert numbers[:, 0].max() < MOST_CYCLES
     assert planned <= 0.5 * single
+
+
+def test_all_acts_at_once_with_learned_stiffness_halve_the_cycles():
+    check_cycles(count_cycles(0, 3))
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("first", range(0, MACHINES, BLOCK))
+def test_a_block_of_machines_needs_half_the_cycles(first):
+    """A block of the machines of the next test, which takes longer than one test may."""
+    check_cycles(count_cycles(first, first + BLOCK))
+
+
+@pytest.mark.nightly
+def test_five_hundred_machines_need_half_the_cycles():
+    blocks = [count_cycles(first, first + BLOCK) for first in range(0, MACHINES, BLOCK)]
+    check_cycles(np.concatenate(blocks))

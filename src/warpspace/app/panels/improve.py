@@ -73,7 +73,7 @@ class AdjustPanel(AnalysisPanel):
     def _accept_outcome(self, outcome: AnalysisOutcome) -> None:
         super()._accept_outcome(outcome)
         offered = self.offered_changes(outcome.result)
-        self.context.post(lambda state: self._with_acts(state, offered[-1] if offered else -1))
+        self.context.post(lambda state: self._with_acts(state, offered[0] if offered else -1))
 
     def use_card(self, state: AppState, action: do.Preview | do.Apply) -> AppState | None:
         used = super().use_card(state, action)
