@@ -23,7 +23,7 @@ from warpspace.app.evaluation.compare import without_words
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import chosen_test, plan_test
 from warpspace.app.panels.analysis_panel import AnalysisPanel, ResultKey
-from warpspace.app.panels.block_html import block_html, details_html
+from warpspace.app.panels.block_html import block_html, details_html, result_html
 from warpspace.app.panels.panel import Context, Jobs, on, with_section
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
@@ -389,6 +389,14 @@ class DiagnosePanel(FilesPanel):
 
     def before_result(self, state: AppState) -> Markup:
         return join((self.files_html(), HTML.upload("Add readings …", self.name, MOST_BYTES)))
+
+    def headline(self, result: Result) -> Markup:
+        return EMPTY
+
+    def result_html(self, result: Result) -> Markup:
+        """Render the causes first, then how to confirm and mend them."""
+        _, *blocks = result.blocks()
+        return result_html(blocks)
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
         """Parse a file; its kind is that stated at its place, or the last one."""
