@@ -199,8 +199,8 @@ class Diagnosis(Result):
         """The first cause, if the readings reveal it and no other explanation is likelier."""
         first = self.causes[0]
         is_hidden = first.summary or self.gained_bits < MIN_GAIN_BITS
-        others = max(self.not_geometric, self.within_tolerance)
-        return None if is_hidden or first.probability < others else first
+        competing = max(self.not_geometric, self.within_tolerance)
+        return None if is_hidden or first.probability < competing else first
 
     def blocks(self) -> Iterator[Block]:
         yield f"{self.title} · {'; '.join(self.sources)}"
@@ -296,8 +296,8 @@ class Explanations:
             return element.format(axis=name.rpartition(" ")[2]), remedy
         row = parameter(name)
         element, remedy = remedies[row.name.partition(" of ")[0]]
-        words = element.format(axis=row.axis, carrier=self._find_carrier(row.axis))
-        return f"{words}: {row.name}", remedy
+        place = element.format(axis=row.axis, carrier=self._find_carrier(row.axis))
+        return f"{place}: {row.name}", remedy
 
     def _find_carrier(self, axis: str) -> str:
         chain = self.set.scene.machine.chain

@@ -137,8 +137,8 @@ def point_labels(picture: LivePicture) -> list[Label]:
         if same_text and distance < TICK * picture.size_mm:
             worst = []
     acts = [Label(text, at) for text, at, _ in planned_adjusters(picture.state) if text]
-    others = (*_diagnosed(picture), *_measured(picture), *_names(picture), *_corners(picture))
-    return [*worst, *point, *acts, *others]
+    places = (*_diagnosed(picture), *_measured(picture), *_names(picture), *_corners(picture))
+    return [*worst, *point, *acts, *places]
 
 
 def trace_label(picture: LivePicture, line: TraceLine) -> str:
