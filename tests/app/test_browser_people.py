@@ -55,7 +55,7 @@ def test_hints_cover_nothing_and_the_first_visit_is_as_calm_as_others(open_tab, 
         assert hint[0] >= 0
         assert hint[2] <= size[0]
     if size == (1440, 900):
-        tab.says("51.7 → 50.2 µm")
+        tab.says("51.7 → 49.5 µm")
         assert all(n <= most for n, most in zip(tab.seen(), MOST, strict=True)), tab.seen()
 
 
