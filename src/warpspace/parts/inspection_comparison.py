@@ -9,7 +9,7 @@ uncertain errors. E_n = (measured − predicted) / √(U² measured + U² predic
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from warpspace.analysis.uncertainty.propagation import (
 from warpspace.exceptions import SceneError
 from warpspace.kinematics import transforms
 from warpspace.machine.limits import MAX_SCENE_BYTES
-from warpspace.parts.inspection import KINDS, find_features
+from warpspace.parts.inspection import KINDS, FeatureResult, find_features
 from warpspace.parts.inspection_report import InspectionReport
 from warpspace.parts.part_shape import PartShape, align
 from warpspace.parts.workpiece import (
@@ -178,6 +178,20 @@ def compare_report(
     ]
 
 
+def predict_measures(features: Sequence[FeatureResult]) -> list[ComparedMeasurand]:
+    """List the predicted deviations of the measures of features, after best-fit placement."""
+    rows: list[ComparedMeasurand] = []
+    for feature in features:
+        for measure, numbers in feature.measures.items():
+            name, unit = ("um", "µm") if "placed_difference_um" in numbers else ("urad", "µrad")
+            key = f"placed_difference_{name}"
+            predicted = numbers[key], numbers.get(f"u95_{key}")
+            rows.append(
+                ComparedMeasurand(feature.name, measure, unit, *predicted, None, None, None)
+            )
+    return rows
+
+
 @dataclass(frozen=True)
 class Seal:
     """A predicted report with its hash: what is written before a part is cut."""
@@ -187,6 +201,20 @@ class Seal:
     sha256: str
     problems: tuple[str, ...] = ()
     content: str = ""  # to be written
+
+    def __str__(self) -> str:
+        states = {"written": "predicted report sealed", "verified": "seal verified"}
+        state = states.get(self.state, f"seal {self.state}")
+        return f"  {state}: {self.file}, SHA-256 {self.sha256[:16]}…"
+
+    def json_fields(self) -> dict[str, Any]:
+        return {"seal": {key: value for key, value in vars(self).items() if key != "content"}}
+
+    def named_files(self) -> dict[str, str]:
+        return {self.file: self.content} if self.content else {}
+
+    def caveats(self) -> Iterator[str]:
+        yield from (f"seal {self.file}: {problem}" for problem in self.problems)
 
 
 def _hash(document: dict[str, Any]) -> str:
@@ -252,13 +280,10 @@ class ReportComparison(Result):
             "measured": [vars(row) for row in self.measured],
             "compared": len(compared), "agreeing": sum(compared),
         }  # fmt: skip
-        if self.seal is not None:
-            seal = replace(self.seal, content="")
-            document["seal"] = {key: value for key, value in vars(seal).items() if key != "content"}
-        return document
+        return document | (self.seal.json_fields() if self.seal else {})
 
     def named_files(self) -> dict[str, str]:
-        return {self.seal.file: self.seal.content} if self.seal and self.seal.content else {}
+        return self.seal.named_files() if self.seal else {}
 
     def caveats(self) -> Iterator[str]:
         yield from super().caveats()
@@ -268,8 +293,7 @@ class ReportComparison(Result):
         yield from self.report.notes
         if self.outside:
             yield f"{self.outside:,} holes are beyond the travel; their errors are continued"
-        if self.seal is not None:
-            yield from (f"seal {self.seal.file}: {problem}" for problem in self.seal.problems)
+        yield from self.seal.caveats() if self.seal else ()
 
     def blocks(self) -> Iterator[Block]:
         at = ", ".join(f"{value:.6g}" for value in self.place)
@@ -280,9 +304,7 @@ class ReportComparison(Result):
 
     def comparison_blocks(self) -> Iterator[Block]:
         if self.seal is not None:
-            states = {"written": "predicted report sealed", "verified": "seal verified"}
-            state = states.get(self.seal.state, f"seal {self.seal.state}")
-            yield f"  {state}: {self.seal.file}, SHA-256 {self.seal.sha256[:16]}…"
+            yield str(self.seal)
         compared = [abs(row.en) for row in self.measured if row.en is not None]
         if compared:
             agreeing = sum(en <= 1.0 for en in compared)

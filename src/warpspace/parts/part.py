@@ -28,8 +28,10 @@ from warpspace.parts.inspection import SCAN_NOISE_UM, FeatureResult, features_ta
 from warpspace.parts.inspection_comparison import (
     PredictedHoles,
     ReportComparison,
+    Seal,
     compare_report,
     predict_features,
+    predict_measures,
     predict_points,
     seal_prediction,
 )
@@ -134,21 +136,17 @@ class Part(WorkpieceAnalysis):
         name = self.measured or (self.file if self.is_file_report else None)
         if self.report is None and name:
             return load_report(name, nominal_only=self.seal is not None)
-        if self.report is None and self.seal:
-            raise OptionError("{seal} without a report; expected {measured} FILE, or a nominal one")
         return self.report
 
     def compare(
         self, report: InspectionReport, holes: PredictedHoles, scene: Scene, place: Sequence[float]
     ) -> ReportComparison:
         measurands = compare_report(report, holes, self.u95_um, self.session_u)
-        seal = seal_prediction(self.seal, scene, place, measurands) if self.seal else None
         return ReportComparison(
             report=report,
             measured=measurands,
             scene=scene,
             place=place,
-            seal=seal,
             second_order=second_order(scene, Loop.RELATIVE),
             uncertainty=holes.errors,
         )
@@ -160,7 +158,8 @@ class Part(WorkpieceAnalysis):
             watch(0.1)
             holes, placed, actual = predict_points(report, scene, self.place)
             compared = self.compare(report, holes, scene, placed.place)
-            return replace(compared, outside=int(actual.outside.sum()))
+            seal = self.seal and seal_prediction(self.seal, scene, placed.place, compared.measured)
+            return replace(compared, outside=int(actual.outside.sum()), seal=seal or None)
         mesh = self.load_mesh(scene)
         of_scene = not (self.mesh or self.file)
         features = self.features or (scene.part.path("features") if of_scene else None)
@@ -185,13 +184,19 @@ class Part(WorkpieceAnalysis):
             features_of = inspect(
                 scene, fine, actual, tolerances, uncertainty, interpolation, self.noise
             )
-        comparison = None
+        comparison = seal = None
+        if self.seal:
+            measurands = predict_measures(features_of)
+            if not measurands:
+                raise OptionError(f"{{seal}}: {mesh.name} has no features to predict")
+            seal = seal_prediction(self.seal, scene, surface.place, measurands)
         if report:
             about = fine, surface, actual, uncertainty, self.noise
             holes = predict_features(report, *about)
             comparison = self.compare(report, holes, scene, surface.place)
         return PartResult(
             comparison=comparison,
+            seal=seal,
             vertices=vertices,
             outside=int(actual.outside[:vertices].sum()),
             **vars(as_cut),
@@ -268,17 +273,19 @@ class PartResult(PartDeviation, Result):
     analysis: Part
     interpolation_um: float  # largest interpolation error; 0 below REPORTED_UM
     comparison: ReportComparison | None = None  # with an inspection report
+    seal: Seal | None = None
 
     def json_fields(self) -> dict[str, Any]:
         compared = self.comparison.json_fields() if self.comparison else {}
-        return super().json_fields() | compared
+        return super().json_fields() | compared | (self.seal.json_fields() if self.seal else {})
 
     def named_files(self) -> Mapping[str, str]:
-        return self.comparison.named_files() if self.comparison else {}
+        return self.seal.named_files() if self.seal else {}
 
     def caveats(self) -> Iterator[str]:
         yield from self.workpiece.warnings
         yield from self.comparison.report_caveats() if self.comparison else ()
+        yield from self.seal.caveats() if self.seal else ()
         if self.outside:
             far = f"{self.outside:,} of {self.vertices:,} vertices"
             yield f"{far} are beyond the travel; their errors are continued"
@@ -319,6 +326,8 @@ class PartResult(PartDeviation, Result):
         for name, state in states.items() if self.uncertainty else ():
             low, high = (plus_minus(state.normal[f"u95_{end}"]) for end in ends)
             yield f"  U95 along the normal, {name}: min {low}, max {high} µm"
+        if self.seal is not None:
+            yield str(self.seal)
         yield from self.comparison.comparison_blocks() if self.comparison else ()
         yield features_table(self.features)
 

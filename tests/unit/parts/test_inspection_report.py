@@ -13,7 +13,7 @@ from simulated_plates import bundled_plates, layout, measured, report_text
 from warpspace.analysis.description import ignore_progress
 from warpspace.cli.analyses import command_of
 from warpspace.cli.file_arguments import guarded
-from warpspace.exceptions import OptionError, SceneError, WarpspaceError
+from warpspace.exceptions import SceneError, WarpspaceError
 from warpspace.parts.inspection_comparison import seal_prediction
 from warpspace.parts.inspection_report import is_report, load_report, parse_report
 from warpspace.parts.part import Part
@@ -303,8 +303,25 @@ def test_what_is_no_seal_is_refused_and_kept(files):
     assert isinstance(said.exception, WarpspaceError)
     assert "is no sealed prediction" in str(said.exception)
     assert other.read_text("utf-8") == "[]"
-    with pytest.raises(OptionError, match="without a report"):
-        Part(seal="x.json").run(load_scene("part_on_dvf5000"), ignore_progress)
+
+
+def test_the_features_of_a_mesh_are_sealed_before_and_verified_after(tmp_path):
+    seal = tmp_path / "seal.json"
+    before = run("part_on_dvf5000", "--seal", seal, "--json")
+    assert before.exit_code == 0, before.output
+    document = json.loads(before.stdout)
+    sealed = {row[0]: row[2] for row in json.loads(seal.read_text("utf-8"))["predicted"]}
+    for feature in document["features"]:
+        for measure, numbers in feature["measures"].items():
+            value = numbers.get("placed_difference_um", numbers.get("placed_difference_urad"))
+            assert sealed.pop(f"{feature['name']} {measure}") == pytest.approx(value, abs=5e-5)
+    assert not sealed
+    assert document["seal"]["state"] == "written"
+    after = json.loads(run("part_on_dvf5000", "--seal", seal, "--json").stdout)
+    assert after["seal"] == {**document["seal"], "state": "verified"}
+    moved = run("part_on_dvf5000", "--seal", seal, "--place", "10,0,50")
+    assert "seal different" in moved.stdout
+    assert "place: " in moved.stderr
 
 
 def test_a_report_alone_is_compared_although_the_scene_has_a_part(files):
