@@ -1,6 +1,6 @@
 """Commands of analyses: options from their fields, output from the blocks of their results."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
@@ -115,14 +115,14 @@ def _runner(kind: "type[Analysis]", run_analysis: Callable[..., Any] | None) -> 
         if result.second_order:
             warn_second_order(result.second_order)
         chart, file = plot if kind.has_chart else None, None if run_analysis else output
-        written_files = write_result(result, csv_path, chart, file, force=force)
+        logs = result.updated_files()
+        written_files = write_result(result, csv_path, chart, file, logs, force=force)
         if as_json:
             document = result.as_json()
             print_json(document | ({"files": written_files} if "files" in document else {}))
             return
         print_blocks(result.blocks())
-        updated = result.updated_files()
-        for path in filter(None, (*(written_files or [output]), csv_path, plot, *updated)):
+        for path in filter(None, (*(written_files or [output]), csv_path, plot, *logs)):
             echo(f"wrote {path}")
 
     return run
@@ -164,9 +164,15 @@ def print_blocks(blocks: "Iterable[Block]") -> None:
 
 
 def write_result(
-    result: "Result", csv_path: str | None, plot: str | None, output: str | None, *, force: bool
+    result: "Result",
+    csv_path: str | None,
+    plot: str | None,
+    output: str | None,
+    logs: Mapping[str, str],
+    *,
+    force: bool,
 ) -> list[str]:
-    """Write all files of a result, or none; return those of -o, the file named first."""
+    """Write all files of a result, or none, then logs; return those of -o, the one named first."""
     files: dict[str | Path, str | bytes] = {**result.named_files()}
     written_files: list[str] = []
     if output is not None:
@@ -196,9 +202,8 @@ def write_result(
 
         draw = resolve_name(result.drawn_by) if result.drawn_by else result_chart
         files[plot] = encode_figure(draw(result), Path(plot).suffix.lower().lstrip("."))
-    logs: dict[str | Path, str | bytes] = {**result.updated_files()}
     write_texts(files, force=force)
-    write_texts(logs, force=True)
+    write_texts({**logs}, force=True)
     return written_files
 
 
