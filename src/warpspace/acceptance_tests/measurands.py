@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from warpspace.acceptance_tests.error_curves import ErrorCurves
+from warpspace.acceptance_tests.next_tests import keep_share
 from warpspace.acceptance_tests.polytope import GAP, Constraint, Polytope, find_largest_error
 from warpspace.analysis.description import NO_JSON, ProgressCallback
 from warpspace.analysis.uncertainty.verdict import Verdict
@@ -137,7 +138,7 @@ def find_largest_deviations(
     """Find the largest |deviation| of each linear measure over the machines that pass."""
     passing, all_machines = curves.polytope(constraints), curves.polytope(())
     for done, (measure, linear) in enumerate(model.linear.items()):
-        tick = partial(_keep_share, watch, done / len(model.linear))
+        tick = partial(keep_share, watch, done / len(model.linear))
         tick(0.0)
         band, kind = model.bands[measure], inspection.KINDS[measure[0]]
         ends = _find_extremes(passing, linear, tick)
@@ -157,10 +158,6 @@ def find_largest_deviations(
             is_kept,
             largest.machine,
         )
-
-
-def _keep_share(watch: ProgressCallback, share: float, _part: float) -> None:
-    watch(share)
 
 
 def _find_extremes(

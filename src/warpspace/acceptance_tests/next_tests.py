@@ -140,7 +140,7 @@ class FurtherTests:
                 is_open[number] = False
                 largest = self.curves.find_largest(
                     self.with_candidates([*chosen, number]),
-                    partial(_keep_share, self.watch, share),
+                    partial(keep_share, self.watch, share),
                     stop_um=float(targets_um[number]),
                 )
                 self.add(largest.machine)
@@ -167,7 +167,7 @@ class FurtherTests:
         machines; or a machine that passes it exceeds the limit, and is added. Exceeding counts from
         `CLOSE` of the limit.
         """
-        tick = partial(_keep_share, self.watch, SET_SHARE)
+        tick = partial(keep_share, self.watch, SET_SHARE)
         while True:
             fails = ~self.passing[:, self.sizes_um > CLOSE * limit_um].T
             if not fails.any(axis=1).all():
@@ -195,10 +195,13 @@ class FurtherTests:
         costs = 1.0 + self.minutes / (1.0 + self.minutes.sum())
         is_integer, rows = np.ones(len(costs), dtype=bool), fails.astype(float)
         chosen, _ = solve_integer_program(costs, rows, (1.0, np.inf), (0.0, 1.0), is_integer)
-        return np.flatnonzero(np.round(costs if chosen is None else chosen)).tolist()
+        if chosen is None:  # all candidates together exclude each machine
+            raise OptionError("{next_count}: the integer program of the smallest set has no answer")
+        return np.flatnonzero(np.round(chosen)).tolist()
 
 
-def _keep_share(watch: ProgressCallback, share: float, _part: float) -> None:
+def keep_share(watch: ProgressCallback, share: float, _part: float) -> None:
+    """Report the same share whatever part of a step is completed."""
     watch(share)
 
 
