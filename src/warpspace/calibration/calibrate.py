@@ -38,7 +38,7 @@ from warpspace.calibration.registry import pair_kinds, read_readings
 from warpspace.calibration.solve import CheckCancelled, never_cancelled, read_keys, rms_mm
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.parts.inspection_report import MAX_SESSION_U
-from warpspace.parts.workpiece import place_part, read_place
+from warpspace.parts.workpiece import REPORT_PLACE_HELP, Place, place_part
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM
 
@@ -122,11 +122,7 @@ class Calibrate(Analysis):
         " Readings without u_um have its scatter; common contributions widen the intervals",
         unset="none",
     )
-    place: Annotated[tuple[float, ...] | None, Grammar("X,Y,Z[,A,B,C]", read_place)] = option(
-        None,
-        "Where parts of inspection reports were clamped, in the workpiece frame, mm and degrees",
-        unset="that of the scene",
-    )
+    place: Place = option(None, REPORT_PLACE_HELP, unset="that of the scene")
     session_u: float | None = option(
         None,
         "Standard uncertainty of the variation between parts: scales and squareness",

@@ -30,7 +30,7 @@ from warpspace.diagnosis.symptoms import SYMPTOM_SHARE, check_symptoms, observe,
 from warpspace.exceptions import OptionError
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import MAX_SCENE_BYTES
-from warpspace.parts.workpiece import place_part, read_place
+from warpspace.parts.workpiece import REPORT_PLACE_HELP, Place, place_part
 from warpspace.resources import assets_dir
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import parse_toml, read_text
@@ -76,11 +76,7 @@ class Diagnose(Analysis):
         " 20 µm where Y reverses",
         flag="--symptom",
     )
-    place: Annotated[tuple[float, ...] | None, Grammar("X,Y,Z[,A,B,C]", read_place)] = option(
-        None,
-        "Where parts of inspection reports were clamped, in the workpiece frame, mm and degrees",
-        unset="that of the scene",
-    )
+    place: Place = option(None, REPORT_PLACE_HELP, unset="that of the scene")
     noise_um: float = option(
         1.0,
         "Standard uncertainty of a reading without a column u_um",
@@ -170,11 +166,14 @@ class CauseGroup:
         """The other causes that explain the readings alone."""
         return [causes[0] for causes in self.group if len(causes) == 1]
 
+    def with_count(self, text: str) -> str:
+        """Append the number of other causes that are not separated from the likeliest one."""
+        count = len(self.single_causes)
+        return text + f" or {count} more" * (count > 0)
+
     @property
     def element_words(self) -> str:
-        """The element, and the number of causes that are not separated from its own."""
-        count = len(self.single_causes)
-        return self.element + f" or {count} more" * (count > 0)
+        return self.with_count(self.element)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,10 +205,9 @@ class Diagnosis(Result):
         yield f"{self.title} · {'; '.join(self.sources)}"
         rows: list[tuple[str, float, str]] = []
         for entry in self.causes:
-            count = len(entry.single_causes)
             element = "" if entry.summary else entry.element
             if entry.probability >= LISTED:
-                name = entry.summary or entry.title + f" or {count} more" * (count > 0)
+                name = entry.summary or entry.with_count(entry.title)
                 rows.append((name, 100.0 * entry.probability, element))
         rows.append(("not geometric", 100.0 * self.not_geometric, self.disturbed))
         rows.append(("all errors within tolerance", 100.0 * self.within_tolerance, ""))

@@ -1,4 +1,4 @@
-"""ReportComparison of an inspection report with the prediction for a machine, and its seal.
+"""Comparison of an inspection report with the prediction for a machine, and its seal.
 
 All measurands are linear in the deviations of the holes: their coordinates after the best-fit
 placement of the report, and the shape of the part with placement free (`PartShape`). The same

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -210,6 +210,12 @@ def read_place(text: str, _scene: Scene | None) -> tuple[float, ...]:
     return place
 
 
+Place: TypeAlias = Annotated[tuple[float, ...] | None, Grammar("X,Y,Z[,A,B,C]", read_place)]
+REPORT_PLACE_HELP = (
+    "Where parts of inspection reports were clamped, in the workpiece frame, mm and degrees"
+)
+
+
 def place_part(scene: Scene, place: Sequence[float] | None) -> Scene:
     """Return a scene whose part is clamped at a place; the same scene without one."""
     if place is None:
@@ -227,7 +233,7 @@ class WorkpieceAnalysis(Analysis):
         positional=True,
         unset="that of the scene",
     )
-    place: Annotated[tuple[float, ...] | None, Grammar("X,Y,Z[,A,B,C]", read_place)] = option(
+    place: Place = option(
         None,
         "Where the part is clamped, in the workpiece frame: shift in mm and turns in degrees about"
         " the fixed x, y, z in that order",

@@ -83,10 +83,8 @@ class FilesPanel(AnalysisPanel):
     def placed_scene(self) -> Scene:
         """Return the scene with its part where the option `place` states it."""
         state = self.context.state
-        place, text = (
-            next(o for o in self.options() if o.name == "place"),
-            self.values(state).get("place", ""),
-        )
+        place = next(option for option in self.options() if option.name == "place")
+        text = self.values(state).get(place.name, "")
         return place_part(state.active_scene(), place.read(text, state.scene) if text else None)
 
     def files_html(self) -> Markup:
@@ -208,10 +206,9 @@ class CalibrateTexts(Calibrate):
     files: tuple[UploadedFile, ...] = ()
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> Calibration:
+        placed = place_part(scene, self.place)
         reading_sets = [
-            parse_readings(
-                file.content, file.name, place_part(scene, self.place), file.kind, self.frame
-            )
+            parse_readings(file.content, file.name, placed, file.kind, self.frame)
             for file in self.files
         ]
         return self.fit_readings(scene, reading_sets, (), lambda: watch(0.0))
