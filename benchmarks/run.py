@@ -25,6 +25,7 @@ BENCHMARKS = (
     "bench_field",
     "bench_model",
     "bench_peers",
+    "bench_task",
     "bench_montecarlo",
     "bench_acceptance",
     "bench_parts",

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from simulated_plates import MACHINE, drilled, layout, measured, report_text
 from warpspace.analysis.description import ignore_progress
@@ -93,21 +94,26 @@ def test_intervals_of_forty_planted_machines_hold():
     assert 0.35 <= without <= 0.8
 
 
+TRIALS = 100  # of a block
 CASES = pytest.mark.parametrize(("count", "stated"), [(2, False), (3, False), (1, True)])
 
 
 @cache
 def covered_block(count, stated, number):
-    return covered(100, count, stated, seed=1000 + number)
+    return covered(TRIALS, count, stated, seed=1000 + number)
 
 
 @pytest.mark.nightly
 @CASES
 @pytest.mark.parametrize("number", range(10))
 def test_a_block_of_intervals_holds(count, stated, number):
-    """A block of the machines of the next test, which takes longer than one test may."""
+    """A block of the machines of the next test, which takes longer than one test may.
+
+    The intervals of a machine share the variation between plates: 100 independent trials. One in
+    10⁴ sets of all blocks would fall below if 95 % hold.
+    """
     term, _, following = covered_block(count, stated, number)
-    assert min(term, following) >= 0.9
+    assert min(term, following) >= binom.ppf(1e-4 / 60, TRIALS, 0.95) / TRIALS
 
 
 @pytest.mark.nightly
@@ -236,33 +242,32 @@ def test_reports_in_the_plane_and_in_space_are_refused_together():
             calibrate(BASE, sets, None, predict)
 
 
-@pytest.mark.nightly
-@pytest.mark.skipif(not PLATES.is_dir(), reason="needs the measured plates")
-@pytest.mark.parametrize(
-    ("number", "scales", "squareness", "rms"),
-    [(8131, (2.6, 11.0), 35.1, (5.84, 4.97)), (8132, (0.9, -9.2), 21.3, (5.59, 5.21))],
-)
-def test_the_printed_shape_of_a_drilled_plate(number, scales, squareness, rms):
-    """Affine fit with free placement; a positive squareness is an angle above 90°."""
-    report = load_report(PLATES / f"D{number}_1.txt")
-    deviation_um = 1e3 * align(report)[0].ravel()
-    shape = PartShape(report.nominal_mm, 2)
-    values = shape.inverses[1] @ deviation_um
-    assert [*values] == pytest.approx([*scales, squareness], abs=0.05)
-    placed = shape.place(deviation_um)
-    fitted = placed - shape.place(shape.columns[1] @ values)
-    sizes = [np.sqrt(np.mean(vector**2)) for vector in (placed, fitted)]
-    assert sizes == pytest.approx(rms, abs=0.005)
+if PLATES.is_dir():  # measured plates, which may not be bundled
 
+    @pytest.mark.nightly
+    @pytest.mark.parametrize(
+        ("number", "scales", "squareness", "rms"),
+        [(8131, (2.6, 11.0), 35.1, (5.84, 4.97)), (8132, (0.9, -9.2), 21.3, (5.59, 5.21))],
+    )
+    def test_the_printed_shape_of_a_drilled_plate(number, scales, squareness, rms):
+        """Affine fit with free placement; a positive squareness is an angle above 90°."""
+        report = load_report(PLATES / f"D{number}_1.txt")
+        deviation_um = 1e3 * align(report)[0].ravel()
+        shape = PartShape(report.nominal_mm, 2)
+        values = shape.inverses[1] @ deviation_um
+        assert [*values] == pytest.approx([*scales, squareness], abs=0.05)
+        placed = shape.place(deviation_um)
+        fitted = placed - shape.place(shape.columns[1] @ values)
+        sizes = [np.sqrt(np.mean(vector**2)) for vector in (placed, fitted)]
+        assert sizes == pytest.approx(rms, abs=0.005)
 
-@pytest.mark.nightly
-@pytest.mark.skipif(not PLATES.is_dir(), reason="needs the measured plates")
-def test_two_drilled_plates_predict_each_other():
-    sets = [
-        read_readings(str(PLATES / f"D{number}_1.txt"), BASE, "part") for number in (8131, 8132)
-    ]
-    rows = {row["measure"]: row for row in calibrate(BASE, sets).as_json()["shape"]}
-    assert rows["squareness"]["value"] == pytest.approx(28.2, abs=0.1)
-    for readings in sets:
-        for value, row in zip(measured_shape(readings), rows.values(), strict=True):
-            assert row["next_part_95"][0] <= value <= row["next_part_95"][1]
+    @pytest.mark.nightly
+    def test_two_drilled_plates_predict_each_other():
+        sets = [
+            read_readings(str(PLATES / f"D{number}_1.txt"), BASE, "part") for number in (8131, 8132)
+        ]
+        rows = {row["measure"]: row for row in calibrate(BASE, sets).as_json()["shape"]}
+        assert rows["squareness"]["value"] == pytest.approx(28.2, abs=0.1)
+        for readings in sets:
+            for value, row in zip(measured_shape(readings), rows.values(), strict=True):
+                assert row["next_part_95"][0] <= value <= row["next_part_95"][1]
