@@ -56,6 +56,17 @@ def test_the_pythons_that_are_promised_are_those_that_were_tried():
         assert [minor for minor, one in rows if one == which] == named
 
 
+def test_the_evidence_names_tests_and_benchmarks_that_exist():
+    text = (DOCS / "evidence.md").read_text("utf-8")
+    paths = re.findall(r"`(?:pytest|python) (?:-m nightly )?([\w/.]+)", text)
+    assert len(paths) > 20
+    for path in paths:
+        assert (ROOT / path).exists(), path
+    assert text.count("234 of 244 agree") == 1
+    rows = (DOCS / "thesis_rows.md").read_text("utf-8")
+    assert "**234 of 244 agree.**" in rows
+
+
 def test_every_page_is_in_a_table_of_contents():
     contained = {(DOCS / "index.md").resolve()}
     for page in pages():

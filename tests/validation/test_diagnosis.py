@@ -201,18 +201,21 @@ def test_a_hundred_machines_are_diagnosed(name, number):
 def test_a_thousand_machines_are_diagnosed(name):
     """Stated probabilities hold; a cause is found after two checks; disturbed readings are told.
 
-    A class of n statements has a standard deviation of at most 0.5/√n.
+    All statements of a diagnosis hold together: before the checks, after one, after two. A class of
+    n statements at one of these times has a standard deviation of at most 0.5/√n.
     """
     stated, ranks = defaultdict(list), defaultdict(list)
     for number in range(BLOCKS):
         for total, part in zip((stated, ranks), draw_block(name, number), strict=True):
             for key, rows in part.items():
                 total[key] += rows
-    for checks in range(CHECKS + 1):
+    stated["all"] = [row for checks in range(CHECKS + 1) for row in stated[checks]]
+    for checks, rows in stated.items():
         for low, high in (*CLASSES.values(), (0.8, 1.01)):
-            count, share, is_true = class_figures(stated[checks], low, high, low == 0.8)
+            count, share, is_true = class_figures(rows, low, high, low == 0.8)
             figures = f"{count} of {low:g} to {high:g}: stated {share:.3f}, true {is_true:.3f}"
             print(f"{name}, {checks} checks: {figures}")
+    for checks in range(CHECKS + 1):
         for label in ("1 causes", "2 causes", "within", "noise", "outliers"):
             rank = np.array(ranks[label, checks])
             figures = f"first {np.mean(rank == 0):.3f}, among three {np.mean(rank < 3):.3f}"
@@ -223,6 +226,10 @@ def test_a_thousand_machines_are_diagnosed(name):
             assert abs(share - is_true) < 0.05 + 0.5 / np.sqrt(count) * (high < 0.95)
         count, _, is_true = class_figures(stated[checks], 0.8, 1.01, causes_only=True)
         assert is_true > 0.95 - 2.0 * np.sqrt(0.05 * 0.95 / count)
+    for low, high in CLASSES.values():
+        _, share, is_true = class_figures(stated["all"], low, high)
+        assert abs(share - is_true) <= 0.05
+    assert class_figures(stated["all"], 0.8, 1.01, causes_only=True)[2] >= 0.95
     assert within_three(ranks["1 causes", CHECKS]) >= 0.95
     disturbed = np.array([*ranks["noise", 0], *ranks["outliers", 0]])
     assert np.mean(disturbed == 0) >= 0.9
