@@ -1,9 +1,10 @@
 """Run the benchmarks and write the performance table.
 
-    python benchmarks/run.py [NAME …] [-o docs/performance.md]
+    python benchmarks/run.py [NAME …] [--runs 3] [-o docs/performance.md]
 
 Without names all are run and the page is written; with names their tables are printed, and a page
-is written only where `-o` asks for one. Exit 1 where a target is missed.
+is written only where `-o` asks for one. With `--runs` everything is run so many times, one complete
+run after the other, and each figure is the median. Exit 1 where a target is missed.
 """
 
 import argparse
@@ -19,7 +20,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # as the command does; before numpy is loaded
 
 import psutil  # noqa: E402
-from table import Section, section_text  # noqa: E402
+from table import Section, median_section, section_text  # noqa: E402
 
 BENCHMARKS = (
     "bench_field",
@@ -45,9 +46,9 @@ PACKAGES = ("warpspace", "numpy", "scipy", "viser", "pyvista", "vtk", "pyarrow")
 PEERS = ("pytransform3d", "pin")
 HEAD = """# Performance
 
-Written by `{command}`; both numbers of a row were measured in the same run, so that the ratio is
-what to compare between machines. Times are processor time unless a row says "wall", and the
-shortest of several runs. An exponent is fitted to the three largest sizes: 1 is proportional.
+Written by `make bench`{runs}. Both numbers of a row are measured in turns: compare the ratio
+between machines, not the time. Times are processor time unless a row says "wall", and the shortest
+of several repetitions. An exponent is fitted to the three largest sizes: 1 is proportional.
 
 | | |
 |---|---|
@@ -82,11 +83,13 @@ def load_words(before: float, after: float) -> str:
     return load_text
 
 
-def page_text(sections: list[Section], load: str, left_out: Sequence[str] = ()) -> str:
+def page_text(
+    sections: list[Section], load: str, left_out: Sequence[str] = (), runs: int = 1
+) -> str:
     """Spell the page, with the benchmarks that were left out."""
     missed = [row.label for section in sections for row in section.rows if not row.is_met]
     head = HEAD.format(
-        command="make bench",
+        runs="" if runs == 1 else f": the medians of {runs} complete runs",
         date=datetime.now(UTC).strftime("%Y-%m-%d"),
         machine=machine_words(),
         load=load,
@@ -101,6 +104,7 @@ def main() -> None:
     """Run from the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", help=f"of {', '.join(BENCHMARKS)}")
+    parser.add_argument("--runs", type=int, default=1, choices=range(1, 10), metavar="N")
     parser.add_argument("-o", "--output", type=Path)
     options = parser.parse_args()
     names = [n if n.startswith("bench_") else f"bench_{n}" for n in options.names] or BENCHMARKS
@@ -108,16 +112,18 @@ def main() -> None:
     if unknown:
         parser.error(f"no benchmark {unknown[0]!r}; expected {', '.join(BENCHMARKS)}")
     before = os.getloadavg()[0]
-    sections = []
-    for name in names:
-        print(f"{name} …", file=sys.stderr, flush=True)
-        sections.append(import_module(name).measure())
-        print(section_text(sections[-1]), flush=True)
+    measured: dict[str, list[Section]] = {name: [] for name in names}
+    for run in range(options.runs):
+        for name in names:
+            print(f"run {run + 1}: {name} …", file=sys.stderr, flush=True)
+            measured[name].append(import_module(name).measure())
+            print(section_text(measured[name][-1]), flush=True)
+    sections = [median_section(runs) for runs in measured.values()]
     output = options.output or (None if options.names else PAGE)
     if output is not None:
         load = load_words(before, os.getloadavg()[0])
         left_out = [name for name in BENCHMARKS if name not in names]
-        output.write_text(page_text(sections, load, left_out), encoding="utf-8")
+        output.write_text(page_text(sections, load, left_out, options.runs), encoding="utf-8")
     missed = [row.label for section in sections for row in section.rows if not row.is_met]
     if missed:
         sys.exit(f"targets missed: {'; '.join(missed)}")

@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from statistics import median
 
 import numpy as np
 
@@ -102,6 +103,24 @@ class Section:
     text: str
     rows: Sequence[Row]
     growth: Sequence[Growth] = ()
+
+
+def median_section(runs: Sequence[Section]) -> Section:
+    """Take the median of each figure and of each baseline over complete runs."""
+    first = runs[0]
+    rows = [
+        replace(
+            same[0],
+            value=median(row.value for row in same),
+            baseline_value=median(row.baseline_value for row in same),
+        )
+        for same in zip(*(run.rows for run in runs), strict=True)
+    ]
+    growth = [
+        replace(same[0], costs=[*map(median, zip(*(curve.costs for curve in same), strict=True))])
+        for same in zip(*(run.growth for run in runs), strict=True)
+    ]
+    return replace(first, rows=rows, growth=growth)
 
 
 def spell(value: float, unit: str = "s") -> str:

@@ -1,4 +1,4 @@
-"""What the benchmarks judge by: the growth of memory."""
+"""What the benchmarks judge by: the growth of memory, and medians of complete runs."""
 
 import sys
 from pathlib import Path
@@ -31,3 +31,23 @@ def test_the_interval_of_a_growth_holds_it_and_is_not_moved_by_single_readings(s
     assert soak_app.is_flat(300.0, 200.0, 1.0 / 60.0)
     assert not soak_app.is_flat(900.0, 200.0, 1.0 / 60.0)
     sys.modules.pop("soak_app")
+
+
+def test_each_figure_is_the_median_of_its_runs_and_the_ratio_that_of_the_medians(monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    from table import Growth, Row, Section, median_section
+
+    runs = [
+        Section(
+            "Start",
+            "",
+            [Row("command", value, "numpy", baseline, max_ratio=2.0)],
+            [Growth("search", "knots", [2.0, 4.0], [value, 2.0 * value])],
+        )
+        for value, baseline in ((3.0, 1.0), (1.0, 2.0), (2.0, 9.0))
+    ]
+    section = median_section(runs)
+    assert (section.rows[0].value, section.rows[0].baseline_value) == (2.0, 2.0)
+    assert section.rows[0].is_met
+    assert section.growth[0].costs == [2.0, 4.0]
+    sys.modules.pop("table")
