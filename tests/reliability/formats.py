@@ -1,5 +1,6 @@
 """The files the program reads: for each format some good ones to begin with, and how it is read."""
 
+import io
 import re
 import struct
 from collections.abc import Callable
@@ -7,17 +8,26 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from warpspace.acceptance_tests.plans import load_plan
+from warpspace.analysis.adjuster_effects import adjuster_effects
+from warpspace.analysis.adjustment_log import read_log
 from warpspace.app.documents.transfers import unpack, upload_text
 from warpspace.bench.base import find_test, run_test
 from warpspace.calibration import read_readings
 from warpspace.calibration.readings import bundled_data
+from warpspace.diagnosis.symptoms import read_symptom
 from warpspace.formats.compensation.compensate import Compensate, compensate
 from warpspace.formats.registry import ReadOptions, find_format, formats, open_upload, read_errors
 from warpspace.formats.to_scene import base_scene, build_imported_scene
+from warpspace.parts.inspection_comparison import seal_prediction
+from warpspace.parts.inspection_report import load_report
+from warpspace.parts.part_shape import align
 from warpspace.parts.program import Program
 from warpspace.resources import assets_dir, find_data, scenes_dir
 from warpspace.scene.library import load_scene, parse_scene, scene_names
+from workbooks import xlsx
 
 
 @dataclass(frozen=True)
@@ -213,6 +223,133 @@ def _read_plan(content: bytes, folder: Path) -> object:
     return load_plan(str(_put(content, folder, "p.toml")), load_scene("dvf5000_general"))
 
 
+REPORT_WORDS = tuple(
+    word.encode()
+    for word in (
+        *(
+            "Nom X",
+            "Nominal Y",
+            "Sollwert X",
+            "Istwert Y",
+            "Meas Z",
+            "Dev X",
+            "Abw. Y",
+            "Units: in",
+        ),
+        *(
+            "mm",
+            "Zoll",
+            "µm",
+            "Hole",
+            "Bohrung",
+            "Ø",
+            "U95",
+            ";",
+            "\t",
+            "1,5",
+            "1.234,5",
+            "9e99",
+            "-",
+        ),
+    )
+)
+
+
+def _reports() -> list[bytes]:
+    bundled = (
+        (assets_dir() / "measurements/simulated_plates/plate_1.txt").read_bytes().splitlines()[:30]
+    )
+    german = (
+        "Bohrung;Sollwert X;Sollwert Y;Abweichung X;Abweichung Y\n1;0;0;0,01;0\n2;100;50;0;0,02\n"
+    )
+    inches = (
+        "Units: inch\nHole,Nom X,Nom Y,Nom Z,Meas X,Meas Y,Meas Z\n"
+        "A,1,1,1,1.01,1,1\nB,9,4,2,9,4,2\n"
+    )
+    return [b"\n".join(bundled), german.encode("latin-1"), inches.encode()]
+
+
+def _read_report(content: bytes, folder: Path, name: str = "report.txt") -> object:
+    return align(load_report(_put(content, folder, name)))
+
+
+def _workbooks() -> list[bytes]:
+    return [
+        xlsx([["Nom X", "Nom Y", "Dev X", "Dev Y"], [0.0, 0.0, 0.01, 0.0], [99.0, 5.0, 0.0, 0.02]])
+    ]
+
+
+def _seals() -> list[bytes]:
+    seal = seal_prediction("none", load_scene("dvf5000_first"), (0.0,) * 6, ())
+    return [seal.content.encode()]
+
+
+def _read_seal(content: bytes, folder: Path) -> object:
+    path = _put(content, folder, "seal.json")
+    return seal_prediction(str(path), load_scene("dvf5000_first"), (0.0,) * 6, ())
+
+
+ADJUSTERS = b"""
+[machine]
+chain = "wFXYZt"
+[workspace]
+X = [0, 400]
+Y = [0, 300]
+Z = [0, 200]
+[errors]
+EC0Y = 30
+EZX = { table = [[0, 0], [200, 5], [400, -5]] }
+""" + b"".join(
+    b"[[machine.adjusters]]\nname = '%s'\nbody = '%s'\nkind = '%s'\nat_mm = [%s]\n"
+    b"direction = [0, 0, 1]\npitch_mm = 0.05\nstep = 0.0625\nrange = [-2, 2]\n" % parts
+    for parts in (
+        (b"foot 1", b"Z", b"levelling foot", b"-300, -200, 0"),
+        (b"foot 2", b"Z", b"levelling foot", b"300, -200, 0"),
+        (b"foot 3", b"Z", b"levelling foot", b"0, 300, 0"),
+    )
+)
+ADJUSTER_WORDS = (
+    *(b"'shim'", b"'gib'", b"'scale factor'", b"'encoder offset'", b"'rail bolt'", b"'frame'"),
+    *(
+        b"direction",
+        b"at_mm",
+        b"pitch_mm",
+        b"step",
+        b"range",
+        b"groups = ['a']",
+        b"[0, 0, 0]",
+        b"0",
+    ),
+)
+LOG = (
+    b"[[done]]\nacts = { 'front column bolts' = 0.01 }\nbefore = { EC0Y = 30, EA0Z = 33.9 }\n",
+    b"[[done]]\nacts = {}\nbefore = 'dvf5000_first'\n",
+)
+SYMPTOMS = (
+    b"circle of 100 mm oval by 30 \xc2\xb5m at 45\xc2\xb0, same in both directions",
+    b"plate of 300 x 200 mm: diagonals differ by 0.2 mm",
+    b"taper 0.03 on 300 along X across Y",
+    b"step of 20 um where Y reverses",
+)
+
+
+def _read_adjusters(content: bytes, folder: Path) -> object:
+    scene = load_scene(_put(content, folder, "a.toml"))
+    return adjuster_effects(scene) if scene.machine.adjusters else scene
+
+
+def _covariances() -> list[bytes]:
+    packed = io.BytesIO()
+    np.savez(packed, keys=np.array(["EC0Y", "EA0Z"]), matrix=np.array([[4.0, 1.0], [1.0, 9.0]]))
+    return [packed.getvalue()]
+
+
+def _read_covariance(content: bytes, folder: Path) -> object:
+    _put(content, folder, "c.npz")
+    scene = b'machine = "dvf5000"\n[uncertainty]\ncovariance = "c.npz"\n'
+    return load_scene(_put(scene, folder, "s.toml"))
+
+
 CODES = "0 1 2 3 17 18 19 20 21 28 43 43.4 49 53 54 59 80 81 82 83 90 91 93 94 98 99 41 68.2 999"
 PROGRAM_WORDS = tuple(
     word.encode()
@@ -279,6 +416,23 @@ FORMATS: list[Format] = [
     Format("readings", _readings, _read_data),
     Format("test", _tests, _read_test),
     Format("plan", _plans, _read_plan),
+    Format("report", _reports, _read_report, 2, words=REPORT_WORDS),
+    Format("report xlsx", _workbooks, partial(_read_report, name="report.xlsx"), text=False),
+    Format("seal", _seals, _read_seal, 0.5),
+    Format("adjusters", lambda: [ADJUSTERS], _read_adjusters, words=ADJUSTER_WORDS),
+    Format(
+        "adjustment log",
+        lambda: [*LOG],
+        lambda text, folder: read_log(
+            str(_put(text, folder, "l.toml")), load_scene("dvf5000_first")
+        ),
+    ),
+    Format("covariance", _covariances, _read_covariance, 0.5, text=False),
+    Format(
+        "symptom",
+        lambda: [*SYMPTOMS],
+        lambda text, _: read_symptom(text.decode("utf-8", "replace"), load_scene("dvf5000_first")),
+    ),
 ]
 PROGRAM = Format("program", _programs, _run_program, words=PROGRAM_WORDS, longest_s=12.0)
 EVERY = [*FORMATS, PROGRAM]

@@ -108,6 +108,8 @@ def parse_table_file(path: Path, limit_bytes: int, parse: Callable[[TextIO], T])
 
 SPREADSHEET = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """First bytes of .xlsx and .ods, and of .xls."""
+DAMAGED = zipfile.BadZipFile, NotImplementedError, UnicodeDecodeError
+"""Errors of zipfile for a damaged archive, or one packed in a way that it does not know."""
 _SAMPLE_BYTES = 4096
 _UTF16_SHARE = 0.3
 """Smallest share of zero bytes at every other position of UTF-16 without a byte order mark."""
@@ -143,16 +145,17 @@ def _sheet_text(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
     except ImportError:
         problem = f"is a spreadsheet; expected the package python-calamine, or {expected}"
         raise SceneError(name, [problem]) from None
-    if zipfile.is_zipfile(io.BytesIO(content)):
-        with zipfile.ZipFile(io.BytesIO(content)) as parts:
-            size = sum(part.file_size for part in parts.infolist())
+    try:
+        size = 0
+        if zipfile.is_zipfile(io.BytesIO(content)):
+            with zipfile.ZipFile(io.BytesIO(content)) as parts:
+                size = sum(part.file_size for part in parts.infolist())
         if size > limits.MAX_CSV_BYTES:
             limit = f"expected at most {limits.MAX_CSV_BYTES:,}"
             raise SceneError(name, [f"is {size:,} bytes long when unpacked; {limit}"])
-    try:
         workbook = reader.CalamineWorkbook.from_filelike(io.BytesIO(content))
         rows = workbook.get_sheet_by_index(0).to_python(skip_empty_area=False)
-    except reader.CalamineError as error:
+    except (reader.CalamineError, *DAMAGED) as error:
         problem = f"is no readable spreadsheet ({one_line(str(error))}); expected {expected}"
         raise SceneError(name, [problem]) from None
     text = io.StringIO()

@@ -114,6 +114,19 @@ def test_a_spreadsheet_is_a_table(tmp_path):
     np.testing.assert_allclose(1e3 * report.deviation_mm, READ_UM, atol=1e-9)
 
 
+def test_a_damaged_spreadsheet_is_refused_whichever_byte_is_wrong(tmp_path):
+    pytest.importorskip("python_calamine")
+    rows = [HEAD.strip().split(";"), *([*map(float, row.split(";"))] for row in ROWS.split())]
+    content, path, refused = xlsx(rows), tmp_path / "report.xlsx", 0
+    for at in range(4, len(content)):
+        path.write_bytes(content[:at] + bytes([content[at] ^ 0xFE]) + content[at + 1 :])
+        try:
+            load_report(path)
+        except SceneError:
+            refused += 1
+    assert refused > len(content) / 2
+
+
 def test_the_layout_of_the_measuring_shop_is_read():
     holes = layout()
     actual = holes + np.array([0.1, -0.05])
