@@ -16,7 +16,7 @@ from warpspace.machine.errors import Constant, ErrorSet
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import evaluate_grid
 
-MACHINES, BLOCK = 500, 25
+MACHINES, BLOCK = 500, 10
 SCENE = """
 [machine]
 chain = "wFXYZt"
