@@ -65,11 +65,10 @@ class Adjuster:
         """Travel of a change by one unit, µm; 1 for a parameter of the control."""
         return 1.0 if self.kind.is_parameter else UM_PER_MM * (self.pitch_mm or 1.0)
 
-    @property
-    def steps(self) -> tuple[int, int]:
-        """Largest numbers of whole steps down and up."""
-        low, high = (round(end / self.step, 9) for end in self.range)
-        return int(np.ceil(low)), int(np.floor(high))
+    def steps_left(self, done: float = 0.0) -> tuple[int, int]:
+        """Return the largest numbers of whole steps down and up that remain after a change."""
+        low, high = min(self.range[0] - done, 0.0), max(self.range[1] - done, 0.0)
+        return int(np.ceil(round(low / self.step, 9))), int(np.floor(round(high / self.step, 9)))
 
     @property
     def joint(self) -> tuple[str, str]:

@@ -1,5 +1,6 @@
 """Adjustment: errors to adjust, and their new values, that reduce the volumetric error."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from dataclasses import field as attribute
@@ -8,13 +9,12 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from warpspace.analysis import description
-from warpspace.analysis.act_planning import Act, Planner
+from warpspace.analysis.act_planning import Act, Planner, is_placement
 from warpspace.analysis.adjustment_log import (
     Stiffness,
     extend_log,
     learn_stiffness,
     read_log,
-    total_changes,
 )
 from warpspace.analysis.adjustment_search import Objective, Search, Volume
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
@@ -38,9 +38,7 @@ from warpspace.field.evaluate import (
     ErrorField,
     View,
     amplitudes_of,
-    fit_placement,
     placed_words,
-    placement_effect,
 )
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
 from warpspace.kinematics.model import Loop
@@ -51,7 +49,6 @@ from warpspace.scene.model import Scene, evaluate_grid, grid_basis, second_order
 from warpspace.units import Array, spell, spell_fixed, spell_short
 
 DEFAULT_LIMIT = 200.0  # µm or µrad by which an error may be changed, unless somebody says otherwise
-PLACEMENT_ONLY = 1e-9  # share of its effect that remains of an error which is only a placement
 MOST_BARS, MOST_VALUES = 14, 3  # errors in a chart, and values beside a bar
 WORTHWHILE = 0.01  # least gain of a proposed set over smaller ones, as a share of the present value
 NO_TOLERANCE = Tolerance(0.0, np.inf)
@@ -278,14 +275,15 @@ class Adjust(description.Analysis):
         entries = read_log(self.done, scene) if self.done else ()
         stiffness = learn_stiffness(scene, entries, self.done or "")
         factors = {name: learnt.factor for name, learnt in stiffness.items()}
-        done = total_changes(scene.machine.adjusters, entries)
+        done = Counter[str]()
+        for entry in entries:
+            done.update(entry.changes)
         excluded = {*scene.parameter_keys} - {*self.included(scene)}
         largest_changes, idle, plans = Planner(scene, grid, view, factors, done, excluded).plan(
             error_um,
             self.objective,
             self.count if error_um.any() else 0,
             constrained=not self.unconstrained,
-            is_placement=lambda response: _is_placement(scene, grid, response),
             advance=watch,
         )
         sets: list[ActSet] = []
@@ -637,14 +635,6 @@ def _with_uncertainty(
     )
 
 
-def _is_placement(scene: Scene, grid: Grid, response: Array) -> Array:
-    """Find the responses, [K], that are those of a placement of the workpiece."""
-    fitted = fit_placement(scene.model, grid, response)
-    rest = response - placement_effect(scene.model, fitted, grid.coordinates, grid.point_mm)[0]
-    largest = [np.abs(part).max(axis=(1, 2, 3, 4), initial=0.0) for part in (rest, response)]
-    return np.less_equal(largest[0], PLACEMENT_ONLY * largest[1])
-
-
 def _candidates(scene: Scene, volume: Volume, analysis: Adjust) -> tuple[int, ...]:
     keys = volume.basis.keys
     active = [keys[index] for index in volume.active_indices]
@@ -652,7 +642,7 @@ def _candidates(scene: Scene, volume: Volume, analysis: Adjust) -> tuple[int, ..
         places = volume.active_indices
     elif not analysis.adjustable:
         constants = [i for i in volume.active_indices if parameter(keys[i]).is_constant]
-        replaced = _is_placement(scene, volume.grid, volume.basis.position[constants])
+        replaced = is_placement(scene, volume.grid, volume.basis.position[constants])
         places = tuple(i for i, is_placed in zip(constants, replaced, strict=True) if not is_placed)
     else:
         for key in analysis.adjustable:
