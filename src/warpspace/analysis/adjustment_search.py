@@ -142,7 +142,7 @@ class Search:
         for size in range(1, min(count, len(candidates)) + 1):
             proven = comb(len(candidates), size) <= MOST_SETS[self.objective]
             if proven or before is None:
-                best = self.best(_joined(group) for group in combinations(candidates, size))
+                best = self.best(combinations(sorted(candidates), size))
             else:
                 best = self._extended(before, candidates)
             if best is None:
@@ -152,11 +152,11 @@ class Search:
 
     def _extended(self, before: Solution, candidates: Sequence[int]) -> Solution | None:
         additions = [index for index in candidates if index not in before.indices]
-        best = self.best(_joined((*before.indices, index)) for index in additions)
+        best = self.best(tuple(sorted((*before.indices, index))) for index in additions)
         while best is not None:
             members = best.indices
             swaps = (
-                _joined((*(index for index in members if index != old), new))
+                tuple(sorted({*members, new} - {old}))
                 for old in members
                 for new in candidates
                 if new not in members
@@ -314,10 +314,6 @@ def _least_max_of_one(
         if best_um - floor_um < CLOSE_UM:
             break
     return Solution((index,), np.array([best]), best_um)
-
-
-def _joined(indices: Sequence[int]) -> tuple[int, ...]:
-    return tuple(sorted(indices))
 
 
 MOST_CUTS = 400  # steps of the search for one number of acts

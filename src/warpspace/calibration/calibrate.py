@@ -7,7 +7,7 @@ from typing import Annotated, Literal, TypeAlias
 import numpy as np
 
 from warpspace.analysis.description import Analysis, ProgressCallback
-from warpspace.analysis.options import PLACE, Files, Grammar, option, typed_word
+from warpspace.analysis.options import PLACE, Files, Grammar, Kinds, option
 from warpspace.analysis.uncertainty.propagation import t_quantile
 from warpspace.calibration.calibration_result import (
     TARGETS,
@@ -80,7 +80,7 @@ class Calibrate(Analysis):
         "CSV file of readings, or the name of a bundled one such as tcp_on.csv",
         required=True,
     )
-    kinds: Annotated[tuple[str, ...], Grammar("KIND", typed_word, each=True)] = option(
+    kinds: Kinds = option(
         (),
         "points, tracker, sphere, sphere-tcp, lengths, part, or a test with its options such as"
         " circular:plane=XZ:radius=150 (`warpspace test --list`)."
