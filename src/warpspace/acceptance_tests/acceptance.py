@@ -272,7 +272,6 @@ class AcceptanceResult(Result):
 
 
 def _measurands_table(measurands: Sequence[Measurand]) -> Table:
-    units = {"um": "µm", "urad": "µrad"}
     return Table(
         (
             Column("measurand", leads=True, wraps=True),
@@ -286,7 +285,7 @@ def _measurands_table(measurands: Sequence[Measurand]) -> Table:
         [
             (
                 f"{each.name} · {each.measure.replace('_', ' ')}", *each.bound, each.without_tests,
-                units[each.unit], " … ".join(map(spell_signed, each.tolerance or ())),
+                UNITS[each.unit], " … ".join(map(spell_signed, each.tolerance or ())),
                 each.verdict,
             )
             for each in measurands
@@ -415,11 +414,7 @@ def _report(
     tests: Sequence[tuple[PlannedTest, Constraint]],
 ) -> AcceptanceResult:
     machine = curves.build_scene(worst.machine)
-    shape = curves.grid.shape
-    at = {
-        axis: float(np.broadcast_to(values, shape).flat[worst.node])
-        for axis, values in curves.grid.coordinates.items()
-    }
+    at = curves.positions_of(worst.node)
     direction = worst.error_um / max(worst.low_um, 1e-30)
     parts = direction @ curves.gains[worst.node] * worst.machine
     contributions = {key: float(part.sum()) for key, part in curves.by_key(parts).items()}

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -11,13 +12,14 @@ from warpspace.analysis.adjuster_effects import add_effects, adjuster_effects
 from warpspace.analysis.adjustment_search import SILENT, Objective, StepSearch, Volume
 from warpspace.field.evaluate import ErrorBasis, View, fit_placement, placement_effect
 from warpspace.field.grid import Grid
-from warpspace.machine.adjusters import Adjuster, spell_act
+from warpspace.machine.adjusters import Adjuster
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene, evaluate_grid
 from warpspace.units import Array
 
 PLACEMENT_ONLY = 1e-9  # share of its effect that remains of an error which is only a placement
+MAX_DENOMINATOR = 64  # of a fraction of a turn
 TOLERANCE_POSITIONS = 5  # along an axis at which a changed curve is compared with its tolerance
 
 
@@ -33,7 +35,14 @@ class Act:
     members: tuple[Adjuster, ...]
 
     def __str__(self) -> str:
-        return spell_act(self.members[0], self.adjuster, self.change)
+        """Write the change: ``rear left foot + 1/8 turn (125 µm)``."""
+        sign, amount = "+" if self.change > 0.0 else "−", abs(self.change)
+        size, um = f"{amount:.6g}", "" if self.um is None else f" ({abs(self.um):.4g} µm)"
+        if self.unit == "turn":
+            turns, fraction = divmod(Fraction(amount).limit_denominator(MAX_DENOMINATOR), 1)
+            if abs(float(turns + fraction) - amount) < self.members[0].step / 100.0:
+                size = " ".join(str(number) for number in (turns, fraction) if number)
+        return f"{self.adjuster} {sign} {size} {self.unit}{um}"
 
 
 class Plan(NamedTuple):

@@ -360,7 +360,7 @@ class StepSearch:
                     proven, ceiling_um = True, best_um + TIE_UM
                     continue
                 value_um, slopes, heights = self.evaluate(change)
-                mean, slope = self.volume.mean(self._indices, change)
+                mean, slope = self.volume.mean(tuple(range(1, len(change) + 1)), change)
                 is_allowed = mean <= self.mean_um + CLOSE_UM
                 if is_allowed and value_um < (2.0 * TIE_UM + best_um if proven else best_um):
                     best, best_um = change, value_um
@@ -374,10 +374,6 @@ class StepSearch:
             if best_um > before_um - CLOSE_UM:
                 return
             yield best, proven
-
-    @property
-    def _indices(self) -> tuple[int, ...]:
-        return tuple(range(1, len(self.steps) + 1))
 
     def evaluate(self, change: Array) -> tuple[float, Array, Array]:
         """Return the objective, and planes below it: slopes, [P, A + 1], and offsets, [P]."""

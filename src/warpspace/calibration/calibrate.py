@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
@@ -144,11 +145,7 @@ class Calibrate(Analysis):
             raise OptionError(
                 f"{{frame}} {self.frame}: no file holds error vectors ({{kinds}} points, tracker)"
             )
-        count = len(self.data)
-
-        def check_cancelled() -> None:
-            watch(0.0)
-
+        count, check_cancelled = len(self.data), partial(watch, 0.0)
         found = self.fit_readings(scene, sets[:count], sets[count:], check_cancelled)
         senses = self._sense_notes(scene, sets[:count], kinds, found, check_cancelled)
         return replace(found, notes=(*found.notes, *senses))

@@ -323,12 +323,9 @@ class Explanations:
         largest_um = float(np.linalg.norm(error_um[at]))
         if largest_um < LEAST_UM:
             return ""
-        place = {
-            axis: float(np.broadcast_to(positions, curves.grid.shape).flat[at])
-            for axis, positions in curves.grid.coordinates.items()
-            if axis in self.set.scene.workspace.volume_axes
-        }
-        return f"up to {largest_um:.1f} µm in the volume, at {place_words(place)}"
+        axes, positions = self.set.scene.workspace.volume_axes, curves.positions_of(at)
+        place = place_words({axis: q for axis, q in positions.items() if axis in axes})
+        return f"up to {largest_um:.1f} µm in the volume, at {place}"
 
 
 @cache

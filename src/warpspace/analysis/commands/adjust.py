@@ -2,9 +2,9 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from dataclasses import field as attribute
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -308,18 +308,13 @@ class Adjust(description.Analysis):
                 )
             )
         keys = dict.fromkeys(key for adjusted in sets for key in adjusted.adjust)
-        planned = replace(
+        return replace(
             result,
             adjustments=tuple(sets),
             adjustable=largest_changes,
             present={key: scene.errors.amplitude(key) for key in keys},
             idle=idle,
-            stiffness=tuple(stiffness.values()),
-        )
-        if not entries:
-            return planned
-        return LearnedResult(
-            **{entry.name: getattr(planned, entry.name) for entry in fields(planned)}
+            stiffness=tuple(stiffness.values()) if entries else None,
         )
 
     def _within_tolerance(
@@ -359,7 +354,11 @@ class AdjustResult(description.Result):
     present: Mapping[str, float]  # value of each of them now, µm or µrad
     # of acts on adjusters; then `adjustable` has the largest change of each act, in its unit
     idle: tuple[str, ...] = ()  # acts without an effect in this loop
-    stiffness: tuple[Stiffness, ...] = ()  # learned from the log
+    stiffness: tuple[Stiffness, ...] | None = None  # learned from the log
+
+    def json_fields(self) -> dict[str, Any]:
+        learned = {} if self.stiffness is None else {"stiffness": self.stiffness}
+        return super().json_fields() | description.to_json(learned)
 
     @property
     def objective(self) -> Objective:
@@ -533,7 +532,7 @@ class AdjustResult(description.Result):
             )
             objective = OBJECTIVE_WORDS[self.objective]
             yield f"  set {adjusted.size}: {objective} {before} → {after} µm; {changes}"
-        for learnt in self.stiffness:
+        for learnt in self.stiffness or ():
             yield (
                 f"  {learnt.adjuster}: effect {learnt.factor:.2f} ± {learnt.u95:.2f} (U95) of the"
                 " geometric one"
@@ -586,12 +585,6 @@ class AdjustResult(description.Result):
                 ("best set of adjustments", "set"),
             ),
         )
-
-
-class LearnedResult(AdjustResult):
-    """Acts with the stiffness of adjusters that a log reveals."""
-
-    json_keys = (*AdjustResult.json_keys, "stiffness")
 
 
 def apply_adjustments(scene: Scene, adjust: Mapping[str, float]) -> Scene:
