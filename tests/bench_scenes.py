@@ -25,6 +25,13 @@ def scene_with(name: str = "dvf5000_nominal", **errors: object) -> Scene:
     return replace(scene, errors=ErrorSet(functions))
 
 
+THREE_AXES = """[machine]
+chain = "wFXYZt"
+[workspace]
+X = [-275, 275]
+Y = [-225, 225]
+Z = [-480, -80]
+"""
 MACHINE = """[machine]
 chain = "wFXYZt"
 [machine.offset_mm]

@@ -3,17 +3,13 @@
 import pytest
 from trimesh import creation
 
-SCENE = """[machine]
-chain = "wFXYZt"
-[workspace]
-X = [-275, 275]
-Y = [-225, 225]
-Z = [-480, -80]
-[part]
+from bench_scenes import THREE_AXES
+
+SCENE = f"""{THREE_AXES}[part]
 file = "box.stl"
 features = "box.toml"
 [tolerances]
-default = { translation = 0, rotation = 0, squareness = 0 }
+default = {{ translation = 0, rotation = 0, squareness = 0 }}
 EC0Y = 25
 """
 FEATURES = """[[features]]

@@ -12,6 +12,7 @@ import pytest
 from scipy.optimize import linprog
 
 import warpspace
+from bench_scenes import THREE_AXES
 from doc_pages import DOCS, blocks
 from warpspace.acceptance_tests.acceptance import Acceptance, find_worst_machine
 from warpspace.acceptance_tests.error_curves import ErrorCurves
@@ -21,14 +22,8 @@ from warpspace.bench.base import run_test
 from warpspace.scene.library import load_scene, parse_scene
 
 KNOTS = 5
-SCENE = """[machine]
-chain = "wFXYZt"
-[workspace]
-X = [-275, 275]
-Y = [-225, 225]
-Z = [-480, -80]
-[view]
-reference = { X = 0, Y = 0, Z = -280 }
+SCENE = f"""{THREE_AXES}[view]
+reference = {{ X = 0, Y = 0, Z = -280 }}
 [tolerances]
 """
 TOLERANCES = "default = { translation = 10, rotation = 20, squareness = 25 }\n"

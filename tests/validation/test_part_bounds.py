@@ -8,6 +8,7 @@ import pytest
 import trimesh
 from trimesh import creation as make
 
+from bench_scenes import THREE_AXES
 from doc_pages import DOCS
 from warpspace.acceptance_tests.acceptance import Acceptance, find_worst_machine
 from warpspace.acceptance_tests.error_curves import ErrorCurves
@@ -27,15 +28,9 @@ from warpspace.parts.part import Part
 from warpspace.parts.workpiece import load_workpiece
 from warpspace.scene.library import load_scene
 
-SCENE = """[machine]
-chain = "wFXYZt"
-[workspace]
-X = [-275, 275]
-Y = [-225, 225]
-Z = [-480, -80]
-[part]
+SCENE = f"""{THREE_AXES}[part]
 file = "plate.stl"
-{features}
+{{features}}
 [tolerances]
 """
 SQUARENESS = "default = { translation = 0, rotation = 0, squareness = 0 }\nEC0Y = 25\n"

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from warpspace.acceptance_tests.plans import UNITS, PlannedTest, default_plan, l
 from warpspace.acceptance_tests.polytope import Constraint, InfeasibleError, LargestError
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import NO_JSON, Analysis, Change, ProgressCallback, Result
-from warpspace.analysis.options import Files, Grammar, option, place_words, typed_word
+from warpspace.analysis.options import Files, Grammar, Kinds, option, place_words, typed_word
 from warpspace.bench.base import run_test
 from warpspace.calibration.calibrate import Budget
 from warpspace.calibration.instruments import NO_INSTRUMENT, instrument_names
@@ -42,6 +42,7 @@ MIN_FACTOR = 1.0 / 128.0
 FACTOR_STEP = 0.015  # relative difference of factors that do and do not keep a limit
 MAX_SLOPE = 1e6
 MAX_SECOND_DIFFERENCE = 1e9
+MARGIN = "value", "limit", "margin"  # columns
 MIN_CONTRIBUTION = 0.01  # share of |E| of an error that the table lists
 Plan: TypeAlias = Annotated[str | None, Grammar("PLAN", typed_word, is_file=True)]
 
@@ -89,7 +90,7 @@ class Acceptance(Analysis):
     data: Files = option(
         (), "Readings of this machine, which its errors agree with: files as for `calibrate`"
     )
-    kinds: Annotated[tuple[str, ...], Grammar("KIND", typed_word, each=True)] = option(
+    kinds: Kinds = option(
         (),
         "Kind of the readings, as for `calibrate`; once for all files, or once for each",
         flag="--kind",
@@ -144,7 +145,8 @@ class Acceptance(Analysis):
             yield from estimate_from_readings(curves, sets, self.instrument, watch)
 
 
-class TestValue(NamedTuple):
+@dataclass(frozen=True)
+class TestValue:
     """A test of the plan on the worst machine."""
 
     name: str
@@ -179,13 +181,10 @@ class AcceptanceResult(Result):
     factor: float | None = None  # for all limits, so that |E| ≤ keep_um; None if there is none
 
     def json_fields(self) -> dict[str, Any]:
-        document = super().json_fields() | {"tests": [test._asdict() for test in self.tests]}
-        unused = {"next"} if not self.next else set[str]()
-        unused |= {"measurands"} if not self.measurands else set[str]()
-        unused |= {"ranges"} if self.ranges is None else set[str]()
+        unused = {key for key in ("next", "measurands", "ranges") if not getattr(self, key)}
         unused |= {"smallest_set"} if self.limit_um is None else set[str]()
         unused |= {"keep_um", "factor"} if self.keep_um is None else set[str]()
-        return {key: value for key, value in document.items() if key not in unused}
+        return {key: value for key, value in super().json_fields().items() if key not in unused}
 
     def changes(self) -> Sequence[Change]:
         return [Change("worst machine that passes", self.machine)]
@@ -201,22 +200,15 @@ class AcceptanceResult(Result):
         yield Table(
             (
                 Column("test", leads=True, wraps=True, key="test"),
-                *number_columns(("value", "limit", "margin"), keys=("value", "limit", "margin")),
+                *number_columns(MARGIN, keys=MARGIN),
                 Column("unit", key="unit"),
             ),
             [
-                (
-                    test.name,
-                    test.value,
-                    test.limit,
-                    round(test.limit - test.value, 6) + 0.0,
-                    test.unit,
-                )
-                for test in self.tests
+                (row.name, row.value, row.limit, round(row.limit - row.value, 6) + 0.0, row.unit)
+                for row in self.tests
             ],
             title="Tests of the worst machine",
         )
-        largest = MIN_CONTRIBUTION * low
         yield Table(
             (
                 Column("key", leads=True),
@@ -228,7 +220,7 @@ class AcceptanceResult(Result):
             [
                 (key, parameter(key).name, self.errors[key], parameter(key).unit, share)
                 for key, share in self.contributions_um.items()
-                if abs(share) >= largest
+                if abs(share) >= MIN_CONTRIBUTION * low
             ],
             title="Errors responsible",
         )
@@ -280,7 +272,6 @@ class AcceptanceResult(Result):
 
 
 def _measurands_table(measurands: Sequence[Measurand]) -> Table:
-    units = {"um": "µm", "urad": "µrad"}
     return Table(
         (
             Column("measurand", leads=True, wraps=True),
@@ -294,7 +285,7 @@ def _measurands_table(measurands: Sequence[Measurand]) -> Table:
         [
             (
                 f"{each.name} · {each.measure.replace('_', ' ')}", *each.bound, each.without_tests,
-                units[each.unit], " … ".join(map(spell_signed, each.tolerance or ())),
+                UNITS[each.unit], " … ".join(map(spell_signed, each.tolerance or ())),
                 each.verdict,
             )
             for each in measurands
@@ -366,7 +357,6 @@ def find_worst_machine(
         report = replace(report, next=tuple(search.find_next(worst, request.next_count)))
         if scene.limit_um is not None:
             smallest = search.find_smallest_set(scene.limit_um)
-            smallest = None if smallest is None else tuple(smallest)
             report = replace(report, limit_um=scene.limit_um, smallest_set=smallest)
     return report
 
@@ -424,11 +414,7 @@ def _report(
     tests: Sequence[tuple[PlannedTest, Constraint]],
 ) -> AcceptanceResult:
     machine = curves.build_scene(worst.machine)
-    shape = curves.grid.shape
-    at = {
-        axis: float(np.broadcast_to(values, shape).flat[worst.node])
-        for axis, values in curves.grid.coordinates.items()
-    }
+    at = curves.positions_of(worst.node)
     direction = worst.error_um / max(worst.low_um, 1e-30)
     parts = direction @ curves.gains[worst.node] * worst.machine
     contributions = {key: float(part.sum()) for key, part in curves.by_key(parts).items()}
@@ -452,7 +438,7 @@ def _report(
         knots=curves.knots,
         bound_um=(worst.low_um, worst.high_um),
         at=at,
-        direction=(float(direction[0]), float(direction[1]), float(direction[2])),
+        direction=tuple(direction.tolist()),
         without_tests_um=without_um,
         tests=tuple(rows),
         errors={key: float(part[np.argmax(np.abs(part))]) for key, part in errors.items()},

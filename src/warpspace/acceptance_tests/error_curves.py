@@ -95,6 +95,11 @@ class ErrorCurves:
         ]
         return build_grid(self.scene.model, self.scene.workspace, nodes)
 
+    def positions_of(self, node: int) -> dict[str, float]:
+        """Return the positions of the axes at a node, mm or degrees."""
+        pairs = self.grid.coordinates.items()
+        return {axis: float(np.broadcast_to(q, self.grid.shape).flat[node]) for axis, q in pairs}
+
     @property
     def curved_axes(self) -> tuple[str, ...]:
         """Axes of the volume between whose knots |E| may be larger than at both."""

@@ -69,10 +69,7 @@ def estimate_from_readings(
 
     The uncertainty of a component includes the common contributions of the instrument.
     """
-
-    def check_cancelled() -> None:
-        watch(0.0)
-
+    check_cancelled = partial(watch, 0.0)
     stated = [readings.sigma_mm is not None for readings in sets]
     sets, _ = with_scatter(curves.scene, sets, FitOptions(instrument=instrument), check_cancelled)
     model = MeasurementModel.of(curves.scene, sets, check_cancelled)

@@ -153,7 +153,7 @@ class FurtherTests:
             worst = best[1]
             yield NextTest.of(self.tests[best[0]], bound_um=worst.high_um)
 
-    def find_smallest_set(self, limit_um: float) -> list[FurtherTest] | None:
+    def find_smallest_set(self, limit_um: float) -> tuple[FurtherTest, ...] | None:
         """Find the fewest, then the quickest, candidates that bring the bound below a limit.
 
         Returns None where all candidates together do not.
@@ -175,7 +175,7 @@ class FurtherTests:
             chosen = self._hit(fails) if len(fails) else []
             largest = self.curves.find_largest(self.with_candidates(chosen), tick, limit_um)
             if largest.high_um <= limit_um:
-                return [FurtherTest.of(self.tests[number]) for number in chosen]
+                return tuple(FurtherTest.of(self.tests[number]) for number in chosen)
             passed = self.add(largest.machine)
             gain = largest.error_um / largest.low_um @ self.curves.gains[largest.node]
             for number in range(len(self.tests)):  # pass more, so that fewer exclude it

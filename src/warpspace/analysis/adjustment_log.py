@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +12,6 @@ from warpspace.analysis.act_planning import Act
 from warpspace.analysis.adjuster_effects import adjuster_effects
 from warpspace.analysis.uncertainty.propagation import coverage_factor
 from warpspace.exceptions import SceneError
-from warpspace.machine.adjusters import Adjuster
 from warpspace.machine.axes import PARAMETERS, parameter
 from warpspace.machine.errors import Constant, ErrorSet
 from warpspace.machine.limits import MAX_SCENE_BYTES
@@ -26,18 +26,12 @@ PRIOR_SD = 0.3  # standard deviation of the effect of an adjuster, relative to t
 CURVE_POSITIONS = 5  # along an axis at which curves before and after are compared
 
 
-class State(NamedTuple):
-    """Errors at one time, and the keys that are known; None for all."""
-
-    errors: ErrorSet
-    keys: frozenset[str] | None
-
-
 class DoneActs(NamedTuple):
     """Changes of adjusters, and the errors before them."""
 
     changes: Mapping[str, float]  # by adjuster, in its unit
-    before: State
+    before: ErrorSet
+    keys: frozenset[str] | None  # that are known before; None for all
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +51,7 @@ def read_log(file: str, scene: Scene) -> tuple[DoneActs, ...]:
     adjusters = scene.machine.adjusters
     groups = {name for adjuster in adjusters for name in adjuster.groups}
     names = [*(adjuster.name for adjuster in adjusters), *sorted(groups)]
-    done: list[dict[str, Any]] = [] if document is None else [*document["done"]]
+    done: Sequence[dict[str, Any]] = document["done"] if document else ()
     entries: list[DoneActs] = []
     for index, entry in enumerate(done):
         key, before = f"done[{index}]", entry["before"]
@@ -68,14 +62,13 @@ def read_log(file: str, scene: Scene) -> tuple[DoneActs, ...]:
                 if name in (adjuster.name, *adjuster.groups):
                     changes[adjuster.name] = changes.get(adjuster.name, 0.0) + change
         if isinstance(before, str):
-            state = State(load_scene(path.parent / before).errors, None)
+            entries.append(DoneActs(changes, load_scene(path.parent / before).errors, None))
         else:
             allowed = [k for k in scene.machine.allowed_keys if PARAMETERS[k].is_constant]
             problems.only(f"{key}.before", before, allowed, "constant error of this machine")
             values = {k: v for k, v in before.items() if k in allowed}
             constants = {k: Constant((0.0, 1.0), value) for k, value in values.items()}
-            state = State(ErrorSet(constants), frozenset(values))
-        entries.append(DoneActs(changes, state))
+            entries.append(DoneActs(changes, ErrorSet(constants), frozenset(values)))
     if problems.lines:
         raise SceneError(file, problems.lines)
     return tuple(entries)
@@ -95,12 +88,11 @@ def learn_stiffness(
         adjuster.name: effect
         for adjuster, effect in zip(scene.machine.adjusters, adjuster_effects(scene), strict=True)
     }
-    states = [*(entry.before for entry in entries), State(scene.errors, None)]
     matrix, readings, unstated = [np.zeros((0, len(names)))], [np.zeros(0)], list[str]()
-    for entry, after in zip(entries, states[1:], strict=True):
+    for entry, after in pairwise((*entries, DoneActs({}, scene.errors, None))):
         changed = {key for name in entry.changes for key in effects[name]}
-        for state in (entry.before, after):
-            changed &= changed if state.keys is None else state.keys
+        for known in (entry.keys, after.keys):
+            changed &= changed if known is None else known
         for key in sorted(changed):
             at = np.zeros(1)
             if not parameter(key).is_constant:
@@ -113,7 +105,7 @@ def learn_stiffness(
             columns = np.zeros((len(at), len(names)))
             for name, change in entry.changes.items():
                 columns[:, names.index(name)] = change * effects[name].evaluate(key, at)
-            difference = after.errors.evaluate(key, at) - entry.before.errors.evaluate(key, at)
+            difference = after.before.evaluate(key, at) - entry.before.evaluate(key, at)
             matrix.append(columns * scale[:, None])
             readings.append(difference * scale)
     if unstated:
@@ -138,14 +130,6 @@ def _standard_uncertainty(scene: Scene, key: str, at: Array) -> Array | None:
         return None
     index = joint.keys.index(key)
     return np.full(at.shape, joint.rows[index][index] ** 0.5)
-
-
-def total_changes(adjusters: Sequence[Adjuster], entries: Sequence[DoneActs]) -> dict[str, float]:
-    """Sum the changes of each adjuster."""
-    return {
-        adjuster.name: sum(entry.changes.get(adjuster.name, 0.0) for entry in entries)
-        for adjuster in adjusters
-    }
 
 
 def extend_log(file: str, scene: Scene, acts: Sequence[Act], keys: Iterable[str]) -> str:

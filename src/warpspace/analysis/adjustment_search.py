@@ -142,7 +142,7 @@ class Search:
         for size in range(1, min(count, len(candidates)) + 1):
             proven = comb(len(candidates), size) <= MOST_SETS[self.objective]
             if proven or before is None:
-                best = self.best(_joined(group) for group in combinations(candidates, size))
+                best = self.best(combinations(sorted(candidates), size))
             else:
                 best = self._extended(before, candidates)
             if best is None:
@@ -152,11 +152,11 @@ class Search:
 
     def _extended(self, before: Solution, candidates: Sequence[int]) -> Solution | None:
         additions = [index for index in candidates if index not in before.indices]
-        best = self.best(_joined((*before.indices, index)) for index in additions)
+        best = self.best(tuple(sorted((*before.indices, index))) for index in additions)
         while best is not None:
             members = best.indices
             swaps = (
-                _joined((*(index for index in members if index != old), new))
+                tuple(sorted({*members, new} - {old}))
                 for old in members
                 for new in candidates
                 if new not in members
@@ -316,10 +316,6 @@ def _least_max_of_one(
     return Solution((index,), np.array([best]), best_um)
 
 
-def _joined(indices: Sequence[int]) -> tuple[int, ...]:
-    return tuple(sorted(indices))
-
-
 MOST_CUTS = 400  # steps of the search for one number of acts
 RANK = 1e-3  # preference of an act over the next one, among equal plans
 TIE_UM = 1e-5  # objectives that differ by less are equal
@@ -364,7 +360,7 @@ class StepSearch:
                     proven, ceiling_um = True, best_um + TIE_UM
                     continue
                 value_um, slopes, heights = self.evaluate(change)
-                mean, slope = self.volume.mean(self._indices, change)
+                mean, slope = self.volume.mean(tuple(range(1, len(change) + 1)), change)
                 is_allowed = mean <= self.mean_um + CLOSE_UM
                 if is_allowed and value_um < (2.0 * TIE_UM + best_um if proven else best_um):
                     best, best_um = change, value_um
@@ -378,10 +374,6 @@ class StepSearch:
             if best_um > before_um - CLOSE_UM:
                 return
             yield best, proven
-
-    @property
-    def _indices(self) -> tuple[int, ...]:
-        return tuple(range(1, len(self.steps) + 1))
 
     def evaluate(self, change: Array) -> tuple[float, Array, Array]:
         """Return the objective, and planes below it: slopes, [P, A + 1], and offsets, [P]."""

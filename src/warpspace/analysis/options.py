@@ -309,6 +309,7 @@ Axis: TypeAlias = Annotated[str, Grammar("AXIS", _axis)]
 Vector: TypeAlias = Annotated[tuple[float, float, float] | None, Grammar("X,Y,Z", _vector)]
 """A point in mm."""
 Files: TypeAlias = Annotated[tuple[str, ...], Grammar("FILE", typed_word, each=True, is_file=True)]
+Kinds: TypeAlias = Annotated[tuple[str, ...], Grammar("KIND", typed_word, each=True)]
 PLACE = Grammar("X=..,Y=..", _place)
 Place: TypeAlias = Annotated[tuple[tuple[str, float], ...], PLACE]
 """Axis positions in mm and degrees."""

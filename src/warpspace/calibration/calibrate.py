@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 
 from warpspace.analysis.description import Analysis, ProgressCallback
-from warpspace.analysis.options import PLACE, Files, Grammar, option, typed_word
+from warpspace.analysis.options import PLACE, Files, Grammar, Kinds, option
 from warpspace.analysis.uncertainty.propagation import t_quantile
 from warpspace.calibration.calibration_result import (
     TARGETS,
@@ -80,7 +81,7 @@ class Calibrate(Analysis):
         "CSV file of readings, or the name of a bundled one such as tcp_on.csv",
         required=True,
     )
-    kinds: Annotated[tuple[str, ...], Grammar("KIND", typed_word, each=True)] = option(
+    kinds: Kinds = option(
         (),
         "points, tracker, sphere, sphere-tcp, lengths, part, or a test with its options such as"
         " circular:plane=XZ:radius=150 (`warpspace test --list`)."
@@ -144,11 +145,7 @@ class Calibrate(Analysis):
             raise OptionError(
                 f"{{frame}} {self.frame}: no file holds error vectors ({{kinds}} points, tracker)"
             )
-        count = len(self.data)
-
-        def check_cancelled() -> None:
-            watch(0.0)
-
+        count, check_cancelled = len(self.data), partial(watch, 0.0)
         found = self.fit_readings(scene, sets[:count], sets[count:], check_cancelled)
         senses = self._sense_notes(scene, sets[:count], kinds, found, check_cancelled)
         return replace(found, notes=(*found.notes, *senses))

@@ -56,13 +56,17 @@ class CauseSet:
     def linear_axes(self) -> tuple[str, ...]:
         return tuple(filter(is_linear, self.scene.machine.axes))
 
+    @property
+    def drive_causes(self) -> list[str]:
+        reversals = [f"reversal of {axis}" for axis in self.scene.machine.axes]
+        return [*reversals, *(f"servo mismatch of {axis}" for axis in self.linear_axes)]
+
     @cached_property
     def variables(self) -> list[str]:
         """Error of each knot, reversals, mismatches, bends, (V,)."""
         return [
             *(key for key, _ in self.curves.variables),
-            *(f"reversal of {axis}" for axis in self.scene.machine.axes),
-            *(f"servo mismatch of {axis}" for axis in self.linear_axes),
+            *self.drive_causes,
             *[BENT] * PLATE_BENDS,
         ]
 
@@ -87,12 +91,8 @@ class CauseSet:
         for key in self.curves.keys:
             shape = np.eye(1) if parameter(key).is_constant else _curve_shape(key)
             yield self._cause(key, [key], self.half_width(key), shape)
-        for axis in axes:
-            name = f"reversal of {axis}"
-            yield self._cause(name, [name], position[axis], np.eye(1))
-        for axis in self.linear_axes:
-            name = f"servo mismatch of {axis}"
-            yield self._cause(name, [name], position[axis], np.eye(1))
+        for name in self.drive_causes:
+            yield self._cause(name, [name], position[name.rpartition(" ")[2]], np.eye(1))
         yield self._cause(BENT, [BENT], self.smallest_um, np.eye(PLATE_BENDS))
         if self.linear_axes:
             spans = [self.scene.axis_span(axis) for axis in self.linear_axes]

@@ -10,7 +10,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table
 from warpspace.analysis.description import NO_JSON, Analysis, ProgressCallback, Result
-from warpspace.analysis.options import Files, Grammar, option, place_words, typed_word
+from warpspace.analysis.options import Files, Grammar, Kinds, option, place_words, typed_word
 from warpspace.calibration.next_best import candidates
 from warpspace.calibration.part_reports import couple_parts
 from warpspace.calibration.readings import Readings
@@ -43,7 +43,6 @@ NAMED = 8  # causes of a group that are named
 NEGLIGIBLE = 1e-6  # reading per half-width, in standard uncertainties
 MANY = 3  # causes of a group that readings should separate before an adjustment
 MIN_GAIN_BITS = 0.1  # information of readings that reveal a cause
-KIND = Grammar("KIND", typed_word, each=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +61,7 @@ class Diagnose(Analysis):
     doing = "diagnosing"
     has_table = True
     data: Files = option((), "CSV file of readings, or the name of a bundled one")
-    kinds: Annotated[tuple[str, ...], KIND] = option(
+    kinds: Kinds = option(
         (),
         "Kind of the readings, as in calibrate: points, lengths, circular:plane=XZ:radius=150, …"
         " Once for all files, or once for each",
@@ -324,12 +323,9 @@ class Explanations:
         largest_um = float(np.linalg.norm(error_um[at]))
         if largest_um < LEAST_UM:
             return ""
-        place = {
-            axis: float(np.broadcast_to(positions, curves.grid.shape).flat[at])
-            for axis, positions in curves.grid.coordinates.items()
-            if axis in self.set.scene.workspace.volume_axes
-        }
-        return f"up to {largest_um:.1f} µm in the volume, at {place_words(place)}"
+        axes, positions = self.set.scene.workspace.volume_axes, curves.positions_of(at)
+        place = place_words({axis: q for axis, q in positions.items() if axis in axes})
+        return f"up to {largest_um:.1f} µm in the volume, at {place}"
 
 
 @cache

@@ -104,16 +104,6 @@ class Hypothesis:
     inverse: Array  # K⁻¹
     log_constant: float
 
-    @classmethod
-    def of(
-        cls, causes: Causes, factor: float, rows: NDArray[np.intp], covariance: Array
-    ) -> "Hypothesis":
-        loss = 1.0 / WITHIN**2 - 1.0 / factor**2
-        kernel = np.eye(len(rows)) / loss - covariance[np.ix_(rows, rows)]
-        volume = np.linalg.slogdet(kernel)[1] + len(rows) * np.log(loss * (factor / WITHIN) ** 2)
-        inverse = np.asarray(np.linalg.inv(kernel), dtype=np.float64)
-        return cls(causes, factor, rows, inverse, -0.5 * float(volume))
-
     def log_ratio(self, means: Array) -> Array:
         """Compute the log evidence relative to all causes within tolerance, [...]."""
         part = means[..., self.rows]
@@ -167,7 +157,11 @@ class Diagnostics:
 
     def suppose(self, causes: Causes, factor: float, covariance: Array) -> Hypothesis:
         rows = np.concatenate([self.blocks[cause] for cause in causes])
-        return Hypothesis.of(causes, factor, rows, covariance)
+        loss = 1.0 / WITHIN**2 - 1.0 / factor**2
+        kernel = np.eye(len(rows)) / loss - covariance[np.ix_(rows, rows)]
+        volume = np.linalg.slogdet(kernel)[1] + len(rows) * np.log(loss * (factor / WITHIN) ** 2)
+        inverse = np.asarray(np.linalg.inv(kernel), dtype=np.float64)
+        return Hypothesis(causes, factor, rows, inverse, -0.5 * float(volume))
 
     def infer(self, deviations: Array | None = None) -> Posterior:
         """Compute the probabilities of all explanations of readings, [N]."""

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from fractions import Fraction
 
 import numpy as np
 
@@ -12,7 +11,6 @@ from warpspace.units import UM_PER_MM, Array
 FRAME = "frame"  # body of adjusters under the bed
 ROW_MM = 1.0  # supports of a row are at most this far aside of it
 COLLINEAR = 1e-6  # smallest singular value of a rigid body map, relative to the supports' distance
-MAX_DENOMINATOR = 64  # of a fraction of a turn
 Supports = tuple[tuple[int, ...], ...]
 
 
@@ -65,28 +63,16 @@ class Adjuster:
         """Travel of a change by one unit, µm; 1 for a parameter of the control."""
         return 1.0 if self.kind.is_parameter else UM_PER_MM * (self.pitch_mm or 1.0)
 
-    @property
-    def steps(self) -> tuple[int, int]:
-        """Largest numbers of whole steps down and up."""
-        low, high = (round(end / self.step, 9) for end in self.range)
-        return int(np.ceil(low)), int(np.floor(high))
+    def steps_left(self, done: float = 0.0) -> tuple[int, int]:
+        """Return the largest numbers of whole steps down and up that remain after a change."""
+        low, high = min(self.range[0] - done, 0.0), max(self.range[1] - done, 0.0)
+        return int(np.ceil(round(low / self.step, 9))), int(np.floor(round(high / self.step, 9)))
 
     @property
     def joint(self) -> tuple[str, str]:
         """Body and way in which it acts; adjusters of one joint act together."""
         is_own = self.kind in (AdjusterKind.GIB, AdjusterKind.RAIL_BOLT) or self.kind.is_parameter
         return self.body, str(self.kind) if is_own else "support"
-
-
-def spell_act(adjuster: Adjuster, name: str, change: float) -> str:
-    """Write a change of an adjuster or of a group: ``rear left foot + 1/8 turn (125 µm)``."""
-    sign, size = "+" if change > 0.0 else "−", f"{abs(change):.6g}"
-    um = "" if adjuster.kind.is_parameter else f" ({abs(change) * adjuster.travel_per_unit:.4g} µm)"
-    if adjuster.unit == "turn":
-        turns, fraction = divmod(Fraction(abs(change)).limit_denominator(MAX_DENOMINATOR), 1)
-        if abs(float(turns + fraction) - abs(change)) < adjuster.step / 100.0:
-            size = " ".join(str(number) for number in (turns, fraction) if number)
-    return f"{name} {sign} {size} {adjuster.unit}{um}"
 
 
 def rigid_map(adjusters: Sequence[Adjuster]) -> tuple[Array, Array]:

@@ -55,9 +55,9 @@ class ComparedMeasurand:
     unit: str
     predicted_um: float
     u95_predicted_um: float | None
-    measured_um: float | None
-    u95_measured_um: float | None
-    en: float | None  # None where an uncertainty is unknown
+    measured_um: float | None = None
+    u95_measured_um: float | None = None
+    en: float | None = None  # where an uncertainty is unknown
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,9 +186,7 @@ def predict_measures(features: Sequence[FeatureResult]) -> list[ComparedMeasuran
             name, unit = ("um", "µm") if "placed_difference_um" in numbers else ("urad", "µrad")
             key = f"placed_difference_{name}"
             predicted = numbers[key], numbers.get(f"u95_{key}")
-            rows.append(
-                ComparedMeasurand(feature.name, measure, unit, *predicted, None, None, None)
-            )
+            rows.append(ComparedMeasurand(feature.name, measure, unit, *predicted))
     return rows
 
 

@@ -240,7 +240,7 @@ def _adjuster_problems(
     low, high = adjuster.range
     if not low <= 0.0 <= high:
         yield "range", "expected a range around 0, the present position", list(adjuster.range)
-    elif adjuster.steps == (0, 0):
+    elif adjuster.steps_left() == (0, 0):
         yield "range", f"holds no step of {adjuster.step:g} {adjuster.unit}", list(adjuster.range)
 
 

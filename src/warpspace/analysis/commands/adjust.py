@@ -1,20 +1,20 @@
 """Adjustment: errors to adjust, and their new values, that reduce the volumetric error."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from dataclasses import field as attribute
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from warpspace.analysis import description
-from warpspace.analysis.act_planning import Act, Planner
+from warpspace.analysis.act_planning import Act, Planner, is_placement
 from warpspace.analysis.adjustment_log import (
     Stiffness,
     extend_log,
     learn_stiffness,
     read_log,
-    total_changes,
 )
 from warpspace.analysis.adjustment_search import Objective, Search, Volume
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
@@ -38,9 +38,7 @@ from warpspace.field.evaluate import (
     ErrorField,
     View,
     amplitudes_of,
-    fit_placement,
     placed_words,
-    placement_effect,
 )
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
 from warpspace.kinematics.model import Loop
@@ -51,7 +49,6 @@ from warpspace.scene.model import Scene, evaluate_grid, grid_basis, second_order
 from warpspace.units import Array, spell, spell_fixed, spell_short
 
 DEFAULT_LIMIT = 200.0  # µm or µrad by which an error may be changed, unless somebody says otherwise
-PLACEMENT_ONLY = 1e-9  # share of its effect that remains of an error which is only a placement
 MOST_BARS, MOST_VALUES = 14, 3  # errors in a chart, and values beside a bar
 WORTHWHILE = 0.01  # least gain of a proposed set over smaller ones, as a share of the present value
 NO_TOLERANCE = Tolerance(0.0, np.inf)
@@ -278,14 +275,15 @@ class Adjust(description.Analysis):
         entries = read_log(self.done, scene) if self.done else ()
         stiffness = learn_stiffness(scene, entries, self.done or "")
         factors = {name: learnt.factor for name, learnt in stiffness.items()}
-        done = total_changes(scene.machine.adjusters, entries)
+        done = Counter[str]()
+        for entry in entries:
+            done.update(entry.changes)
         excluded = {*scene.parameter_keys} - {*self.included(scene)}
         largest_changes, idle, plans = Planner(scene, grid, view, factors, done, excluded).plan(
             error_um,
             self.objective,
             self.count if error_um.any() else 0,
             constrained=not self.unconstrained,
-            is_placement=lambda response: _is_placement(scene, grid, response),
             advance=watch,
         )
         sets: list[ActSet] = []
@@ -310,18 +308,13 @@ class Adjust(description.Analysis):
                 )
             )
         keys = dict.fromkeys(key for adjusted in sets for key in adjusted.adjust)
-        planned = replace(
+        return replace(
             result,
             adjustments=tuple(sets),
             adjustable=largest_changes,
             present={key: scene.errors.amplitude(key) for key in keys},
             idle=idle,
-            stiffness=tuple(stiffness.values()),
-        )
-        if not entries:
-            return planned
-        return LearnedResult(
-            **{entry.name: getattr(planned, entry.name) for entry in fields(planned)}
+            stiffness=tuple(stiffness.values()) if entries else None,
         )
 
     def _within_tolerance(
@@ -361,7 +354,11 @@ class AdjustResult(description.Result):
     present: Mapping[str, float]  # value of each of them now, µm or µrad
     # of acts on adjusters; then `adjustable` has the largest change of each act, in its unit
     idle: tuple[str, ...] = ()  # acts without an effect in this loop
-    stiffness: tuple[Stiffness, ...] = ()  # learned from the log
+    stiffness: tuple[Stiffness, ...] | None = None  # learned from the log
+
+    def json_fields(self) -> dict[str, Any]:
+        learned = {} if self.stiffness is None else {"stiffness": self.stiffness}
+        return super().json_fields() | description.to_json(learned)
 
     @property
     def objective(self) -> Objective:
@@ -535,7 +532,7 @@ class AdjustResult(description.Result):
             )
             objective = OBJECTIVE_WORDS[self.objective]
             yield f"  set {adjusted.size}: {objective} {before} → {after} µm; {changes}"
-        for learnt in self.stiffness:
+        for learnt in self.stiffness or ():
             yield (
                 f"  {learnt.adjuster}: effect {learnt.factor:.2f} ± {learnt.u95:.2f} (U95) of the"
                 " geometric one"
@@ -590,12 +587,6 @@ class AdjustResult(description.Result):
         )
 
 
-class LearnedResult(AdjustResult):
-    """Acts with the stiffness of adjusters that a log reveals."""
-
-    json_keys = (*AdjustResult.json_keys, "stiffness")
-
-
 def apply_adjustments(scene: Scene, adjust: Mapping[str, float]) -> Scene:
     errors = scene.errors
     for key, value in adjust.items():
@@ -637,14 +628,6 @@ def _with_uncertainty(
     )
 
 
-def _is_placement(scene: Scene, grid: Grid, response: Array) -> Array:
-    """Find the responses, [K], that are those of a placement of the workpiece."""
-    fitted = fit_placement(scene.model, grid, response)
-    rest = response - placement_effect(scene.model, fitted, grid.coordinates, grid.point_mm)[0]
-    largest = [np.abs(part).max(axis=(1, 2, 3, 4), initial=0.0) for part in (rest, response)]
-    return np.less_equal(largest[0], PLACEMENT_ONLY * largest[1])
-
-
 def _candidates(scene: Scene, volume: Volume, analysis: Adjust) -> tuple[int, ...]:
     keys = volume.basis.keys
     active = [keys[index] for index in volume.active_indices]
@@ -652,7 +635,7 @@ def _candidates(scene: Scene, volume: Volume, analysis: Adjust) -> tuple[int, ..
         places = volume.active_indices
     elif not analysis.adjustable:
         constants = [i for i in volume.active_indices if parameter(keys[i]).is_constant]
-        replaced = _is_placement(scene, volume.grid, volume.basis.position[constants])
+        replaced = is_placement(scene, volume.grid, volume.basis.position[constants])
         places = tuple(i for i, is_placed in zip(constants, replaced, strict=True) if not is_placed)
     else:
         for key in analysis.adjustable:

@@ -80,13 +80,6 @@ class FilesPanel(AnalysisPanel):
     def set_files(self, files: tuple[UploadedFile, ...]) -> None:
         self.files = files
 
-    def placed_scene(self) -> Scene:
-        """Return the scene with its part where the option `place` states it."""
-        state = self.context.state
-        place = next(option for option in self.options() if option.name == "place")
-        text = self.values(state).get(place.name, "")
-        return place_part(state.active_scene(), place.read(text, state.scene) if text else None)
-
     def files_html(self) -> Markup:
         return HTML.files(self.name, self.files, self._upload_problem, self._uploads.html())
 
@@ -235,7 +228,31 @@ def read_uploaded(
     return UploadedFile(unique_name, text, description, kind, len(readings))
 
 
-class CalibratePanel(FilesPanel):
+class ReadingsPanel(FilesPanel):
+    """Files of readings, and what is computed of them."""
+
+    def inputs(self, state: AppState) -> Mapping[str, Any]:
+        return {"files": self.files}
+
+    def kind_of_next(self, state: AppState) -> str | None:
+        """Return the kind of the next file; None if it is recognised by its columns."""
+        raise NotImplementedError
+
+    def placed_scene(self) -> Scene:
+        """Return the scene with its part where the option `place` states it."""
+        state = self.context.state
+        place = next(option for option in self.options() if option.name == "place")
+        text = self.values(state).get(place.name, "")
+        return place_part(state.active_scene(), place.read(text, state.scene) if text else None)
+
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
+        (text, _), files = decode_text(content, name), self.files
+        kind = self.kind_of_next(self.context.state)
+        uploaded = read_uploaded(self.placed_scene(), text, name, kind, files)
+        return partial(self.set_files, (*files, uploaded))
+
+
+class CalibratePanel(ReadingsPanel):
     """Uploaded readings, fitted errors, and residuals as arrows in the drawing."""
 
     own_kind, unsupported = CalibrateTexts, ("kinds",)  # set per file
@@ -245,8 +262,8 @@ class CalibratePanel(FilesPanel):
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), "next_count": "3"}
 
-    def inputs(self, state: AppState) -> Mapping[str, Any]:
-        return {"files": self.files}
+    def kind_of_next(self, state: AppState) -> str | None:
+        return self._next_kind or None
 
     def before_result(self, state: AppState) -> Markup:
         bundled = {"": "Bundled readings …"} | {name: name for name in bundled_data()}
@@ -288,12 +305,6 @@ class CalibratePanel(FilesPanel):
         self._arrows = arrows if arrows in ARROWS else ""
         self.context.call_soon(self.rerender)
         return edits.with_sight(state, inside=bool(self._arrows))
-
-    def parse(self, name: str, content: bytes) -> Callable[[], None]:
-        text, _ = decode_text(content, name)
-        scene, kind, files = self.placed_scene(), self._next_kind, self.files
-        uploaded = read_uploaded(scene, text, name, kind or None, files)
-        return partial(self.set_files, (*files, uploaded))
 
     # --- arrows ----------------------------------------------------------------------------------
 
@@ -353,7 +364,7 @@ class DiagnoseTexts(Diagnose):
         return self.diagnose(list(parsed), scene, watch)
 
 
-class DiagnosePanel(FilesPanel):
+class DiagnosePanel(ReadingsPanel):
     """Uploaded readings and typed symptoms, and their causes."""
 
     own_kind = DiagnoseTexts
@@ -362,9 +373,6 @@ class DiagnosePanel(FilesPanel):
 
     def is_ready(self, state: AppState) -> bool:
         return bool(self.files or self.values(state).get("symptoms"))
-
-    def inputs(self, state: AppState) -> Mapping[str, Any]:
-        return {"files": self.files}
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (*super().body_dependencies(picture), picture.state.page.element)
@@ -395,10 +403,7 @@ class DiagnosePanel(FilesPanel):
         _, *blocks = result.blocks()
         return result_html(blocks)
 
-    def parse(self, name: str, content: bytes) -> Callable[[], None]:
-        """Parse a file; its kind is that stated at its place, or the last one."""
-        kinds = self.values(self.context.state).get("kinds", "").split()
-        kind = kinds[min(len(self.files), len(kinds) - 1)] if kinds else None
-        text, _ = decode_text(content, name)
-        uploaded = read_uploaded(self.placed_scene(), text, name, kind, self.files)
-        return partial(self.set_files, (*self.files, uploaded))
+    def kind_of_next(self, state: AppState) -> str | None:
+        """Return the kind stated at the place of the next file, or the last one."""
+        kinds = self.values(state).get("kinds", "").split()
+        return kinds[min(len(self.files), len(kinds) - 1)] if kinds else None
