@@ -159,8 +159,6 @@ def _strict(kind: "click.ParamType[Any]") -> "click.ParamType[Any]":
 
 def check_files(context: click.Context, companions: Iterable[Path] = ()) -> None:
     """Raise an error if an output of a command must not be written."""
-    from warpspace.outputs.file_output import check_target
-
     values = [
         (param, value)
         for param in context.command.params
@@ -174,6 +172,8 @@ def check_files(context: click.Context, companions: Iterable[Path] = ()) -> None
     outputs += [("a companion file", path, ()) for path in companions]
     force = bool(context.params.get("force"))
     for index, (option, path, endings) in enumerate(outputs):
+        from warpspace.outputs.file_output import check_target
+
         inputs = (
             file
             for param, value in values

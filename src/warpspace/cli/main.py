@@ -1,6 +1,8 @@
 """The command `warpspace`: its group, its commands, errors as messages, signals."""
 
+import atexit
 import builtins
+import gc
 import io
 import logging
 import os
@@ -61,9 +63,8 @@ def task_of(name: str) -> "Task":
 
 
 def _build(name: str) -> click.Command:
-    for entry in entries():
-        if entry.name == name:
-            return command_of(entry.load())
+    if name not in TASK_OF_BUNDLED:  # plug-ins are looked for only where they may matter
+        return command_of({entry.name: entry for entry in entries()}[name].load())
     task = TASK_OF_BUNDLED[name]
     function = name.replace("-", "_")
     if iskeyword(function) or hasattr(builtins, function):
@@ -115,6 +116,7 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line; expected errors are one message on stderr and exit status 2."""
+    atexit.register(gc.freeze)  # the end of the process frees what a last collection would
     _open_standard_streams()
     _silence_libraries()
     with handle_signals() as ending:

@@ -7,12 +7,14 @@ second shows its progress on stderr, unless that is no terminal or the output is
 """
 
 import io
+import os
 import re
 import shutil
 import sys
 import textwrap
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
+from itertools import zip_longest
 from threading import Timer
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -27,6 +29,10 @@ WIDTH_ELSEWHERE = 80  # characters per line if the output is no terminal
 READABLE = 20  # characters per line of a text column before other columns move below
 REPEATED = 40  # rows after which headings repeat
 Row = Sequence[str]
+_NARROW = re.compile(
+    "[\n -~\xa0-\xac\xae-\u02ff\u0370-\u0482\u2010-\u2027\u2070-\u20c0\u2100-\u2319]*"
+)
+"""Texts whose characters all take one cell of a terminal."""
 _UNBROKEN_SPACES = re.compile(r"(?<=\d) (?=[µm°%])|(?<= [A-Z]) (?=[-+\d])")
 """Spaces without a line break: number and unit, axis and position."""
 
@@ -76,14 +82,21 @@ class _Size(NamedTuple):
 
 
 def _measure(column: "Column", cells: Sequence[str]) -> _Size:
-    from rich.cells import cell_len
-
     lines = [line for text in (column.head, *cells) for line in text.splitlines()]
-    natural = max(map(cell_len, lines), default=0)
+    natural = max(map(_text_width, lines), default=0)
     if not column.wraps:
         return _Size(natural, natural, natural)
-    least = max((cell_len(word) for line in lines for word in line.split()), default=0)
+    least = max((_text_width(word) for line in lines for word in line.split()), default=0)
     return _Size(least, min(natural, max(least, READABLE)), natural)
+
+
+def _text_width(text: str) -> int:
+    """Count the characters of a terminal that a text takes."""
+    if _NARROW.fullmatch(text):
+        return len(text)
+    from rich.cells import cell_len
+
+    return cell_len(text)
 
 
 def _split(columns: "Sequence[Column]", widths: Sequence[int], room: int) -> list[list[int]]:
@@ -108,28 +121,45 @@ def _split(columns: "Sequence[Column]", widths: Sequence[int], room: int) -> lis
 
 
 def _draw(columns: "Sequence[Column]", rows: Sequence[Row], gap: int, width: int) -> str:
+    """Draw a table; its cells are wrapped, by rich, only if they do not fit."""
+    has_header = any(column.heading for column in columns)
+    lines = max((column.head.count("\n") for column in columns), default=0)
+    heads = ["\n" * (lines - column.head.count("\n")) + column.head for column in columns]
+    drawn: list[Row] = [heads] if has_header else []
+    for number, row in enumerate(rows):
+        if has_header and number and number % REPEATED == 0:
+            drawn += [[""] * len(columns), heads]
+        drawn.append(row)
+    sizes = [max(map(len, "\n".join(cells).split("\n"))) for cells in zip(*drawn, strict=True)]
+    is_narrow = all(_NARROW.fullmatch(cell) for row in drawn for cell in row)
+    if not is_narrow or sum(sizes) + gap * (len(sizes) - 1) > width:
+        return _draw_wrapped(columns, drawn, gap, width, has_header=has_header)
+    aligned = [
+        (" " * gap).join(
+            text.rstrip().rjust(size) if column.is_number else text.ljust(size)
+            for column, text, size in zip(columns, texts, sizes, strict=True)
+        )
+        for row in drawn
+        for texts in zip_longest(*(cell.split("\n") for cell in row), fillvalue="")
+    ]
+    is_styled = sys.stdout.isatty() and os.environ.get("TERM") not in ("dumb", "unknown")
+    bold = lines + 1 if has_header and is_styled else 0
+    styled = [click.style(line, bold=True) for line in aligned[:bold]]
+    return "\n".join(line.rstrip() for line in (*styled, *aligned[bold:]))
+
+
+def _draw_wrapped(
+    columns: "Sequence[Column]", rows: Sequence[Row], gap: int, width: int, *, has_header: bool
+) -> str:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(
-        box=None,
-        padding=(0, gap, 0, 0),
-        pad_edge=False,
-        show_header=any(column.heading for column in columns),
-    )
+    table = Table(box=None, padding=(0, gap, 0, 0), pad_edge=False, show_header=has_header)
     for column in columns:
-        table.add_column(
-            Text(column.head),
-            justify="right" if column.is_number else "left",
-            no_wrap=not column.wraps,
-        )
-    lines = max((column.head.count("\n") for column in columns), default=0)
-    heads = [Text("\n" * (lines - column.head.count("\n")) + column.head) for column in columns]
-    for number, row in enumerate(rows):
-        if table.show_header and number and number % REPEATED == 0:
-            table.add_row()
-            table.add_row(*heads)
+        justify = "right" if column.is_number else "left"
+        table.add_column(Text(column.head), justify=justify, no_wrap=not column.wraps)
+    for row in rows[has_header:]:
         table.add_row(*map(Text, row))
     page = io.StringIO()
     console = Console(

@@ -275,7 +275,7 @@ class CurveReader:
             nested=lambda part, path: self._read(part, text_files.location(where, path), constant),
         )
         table = cast("dict[str, object]", raw) if isinstance(raw, dict) else {}
-        form_of_table = find_form(table)
+        form_of_table = find_form(table) if table else None
         if is_number(raw):
             curve, form = Constant.read(raw, self.span, reader), ()
         elif form_of_table is not None:

@@ -121,7 +121,7 @@ class ErrorUncertainty:
         below, above = (t.cdf((end - value) / unit, self.dof) for end in (low, high))
         return above - below
 
-    def draw(self, rng: np.random.Generator, count: int) -> Array:
+    def draw(self, rng: "np.random.Generator", count: int) -> Array:
         """Draw changes of the amplitudes, [count, K]: normal, or Student's t of their dof."""
         changes = rng.standard_normal((count, len(self.keys))) @ self.root.T
         for dof in {*self.dofs.tolist()} - {np.inf}:

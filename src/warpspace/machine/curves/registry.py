@@ -44,9 +44,13 @@ def register_curve(kind: CurveKind) -> None:
 
 def find_form(raw: Mapping[str, object]) -> tuple[CurveKind, Form] | None:
     """Find the kind and form of a curve in a table of a scene file."""
-    return next(
-        ((kind, form) for kind in curve_kinds() for form in kind.forms if form[0] in raw), None
+    forms = (
+        (kind, form)
+        for list_kinds in (_KINDS.values, curve_kinds)  # plug-ins are looked for where none fits
+        for kind in list_kinds()
+        for form in kind.forms
     )
+    return next((pair for pair in forms if pair[1][0] in raw), None)
 
 
 def spell_forms() -> str:
