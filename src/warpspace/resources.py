@@ -5,6 +5,7 @@ from pathlib import Path
 from warpspace.exceptions import WarpspaceError
 
 __version__ = "0.1.0"
+RENDERER_MB = 1600  # address space of the renderer for a picture
 _PACKAGE_DIR = Path(__file__).resolve().parent
 
 

@@ -80,6 +80,10 @@ RENDERERS = "viser pyvista vtkmodules matplotlib trimesh"
         # half of what the command took was scipy.stats, which only uncertainties need
         ("field dvf5000_first --at X=0", f"scipy.stats pandas pyarrow {RENDERERS}"),
         ("field dvf5000_first --grid 3 -o x.npz", f"scipy.stats pandas pyarrow {RENDERERS}"),
+        (
+            "draw dvf5000_first --grid 3 -o x.png",
+            "scipy multiprocessing pandas pyarrow warpspace.analysis.sampling.distribution",
+        ),
     ],
 )
 def test_a_command_loads_nothing_heavy_that_it_does_not_need(arguments, heavy, tmp_path):

@@ -14,7 +14,7 @@ from warpspace.analysis.options import outside_travel, read_place
 from warpspace.cli.file_arguments import OutputFile, SceneName
 from warpspace.cli.tables import escape_json, progress, warn
 from warpspace.exceptions import OptionError
-from warpspace.resources import check_address_space
+from warpspace.resources import RENDERER_MB, check_address_space
 from warpspace.scene.text_files import parse_number, parse_whole
 
 if TYPE_CHECKING:
@@ -304,8 +304,7 @@ def draw_figure_file(
     silent: bool = False,
 ) -> None:
     from warpspace.outputs.figure_files import write_figure
-    from warpspace.outputs.processes import LEAST_MB
 
-    check_address_space(LEAST_MB, "drawing")
+    check_address_space(RENDERER_MB, "drawing")
     with progress("drawing", silent=silent):
         write_figure(target, name, scenes, settings, force=force)

@@ -5,6 +5,7 @@ import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
+from weakref import WeakSet
 
 import matplotlib as mpl
 import numpy as np
@@ -45,12 +46,17 @@ def figure_bytes(drawing: Drawing, form: str) -> bytes:
     return encode_figure(drawing.figure, form, {"Title": drawing.title, **tags})
 
 
+_figures: WeakSet[Figure] = WeakSet()
+
+
 def render_figure(
     name: str, scenes: Sequence[Scene], settings: FigureSettings, form: str = "png"
 ) -> bytes:
-    gc.collect()  # a figure refers to itself: 100 MB of those before would wait for the collector
+    if _figures:  # a figure refers to itself: 100 MB of those before would wait for the collector
+        gc.collect()
     with mpl.rc_context(SAVE_RC):
         drawing = draw_figure(name, scenes, settings, exact=form == "png")
+    _figures.add(drawing.figure)
     return figure_bytes(drawing, form)
 
 

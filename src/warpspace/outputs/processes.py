@@ -21,7 +21,7 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 from warpspace import exceptions
-from warpspace.resources import check_address_space
+from warpspace.resources import RENDERER_MB, check_address_space
 
 if TYPE_CHECKING:
     from warpspace.outputs.drawing.settings import FigureSettings
@@ -224,7 +224,6 @@ def _end_with_parent() -> None:
 
 PICTURES_PER_PROCESS = 100  # after which a process is replaced
 TIMEOUT_S = 300.0
-LEAST_MB = 1600  # address space of the renderer for a picture
 
 
 def _draw(name: str, scenes: "Sequence[Scene]", settings: "FigureSettings", form: str) -> bytes:
@@ -252,7 +251,7 @@ class FigureWorker:
     """
 
     def __init__(self, timeout_s: float = TIMEOUT_S) -> None:
-        check_address_space(LEAST_MB, "drawing")
+        check_address_space(RENDERER_MB, "drawing")
         self._timeout_s = timeout_s
         self._lock = threading.Lock()
         self._pool: ProcessPool | None = None

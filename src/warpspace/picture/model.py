@@ -9,7 +9,6 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.analysis.commands.concepts import Concept, expected_um
 from warpspace.analysis.description import to_json
 from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.analysis.uncertainty.propagation import (
@@ -433,20 +432,5 @@ def evaluate_picture(
         colours=colours,
         hatch_um=scene.limit_um if (component, quantity) == ("norm", "position") else None,
         conditions=(*direction_words(scene), *placed_words(view), *orders, *conditions),
-        scene=scene,
-    )
-
-
-def picture_concept(concept: Concept, nodes: int) -> ScenePicture:
-    """Build a picture of the nominal volume, coloured by the RMS of |E| within tolerance."""
-    scene = concept.scene
-    grid = build_grid(scene.model, scene.workspace, nodes)
-    expected, zero = expected_um(concept, grid), np.zeros(grid.nominal_mm.shape)
-    along_x = np.stack([expected, zero[..., 0], zero[..., 0]], axis=-1)
-    return ScenePicture(
-        view=concept.sampled.case.view,
-        grid=grid,
-        field=ErrorField(grid.nominal_mm, along_x, zero),
-        exaggeration=0.0,
         scene=scene,
     )

@@ -8,8 +8,9 @@ import pytest
 from still_scenes import still_scene
 from warpspace.analysis.commands.concepts import Concepts, compare_concepts
 from warpspace.field.evaluate import evaluate_exact
+from warpspace.outputs.figures.side_by_side import picture_concept
 from warpspace.picture.formatting import convention_sentences, convention_words
-from warpspace.picture.model import evaluate_picture, picture_concept
+from warpspace.picture.model import evaluate_picture
 from warpspace.picture.traces import (
     evaluate_axis_motion,
     evaluate_traces,

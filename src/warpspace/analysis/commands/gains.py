@@ -79,6 +79,7 @@ DEFAULT_STEPS_DEG = (1.0, 5.0, 10.0, 15.0, 30.0, 45.0, 90.0)
 """Of rotary axes: the finest that keeps to `MAX_DEFAULT_NODES` positions; 1° for two axes."""
 MAX_NODES = 5_000_000
 MAX_DEFAULT_NODES = 500_000
+NODES_AT_ONCE = 4_000  # of a sweep: few calls, and arrays that stay in the cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,18 +176,20 @@ def _larger(
     coordinates: Mapping[str, Array],
     best: Gain | None = None,
 ) -> Gain:
-    shape = np.broadcast_shapes(*(values.shape for values in coordinates.values()))
-    size = np.abs(np.broadcast_to(col.position, (*shape, 3)))
-    norms = np.linalg.norm(size, axis=-1)
-    top = size.reshape(-1, 3).max(axis=0)
+    sizes = np.abs(np.moveaxis(col.position, -1, 0))
+    norms = np.sqrt(sum(sizes * sizes))
+    top = sizes.max(axis=tuple(range(1, sizes.ndim)))
     # Rounded, so that of positions that are equal but for rounding errors the first is taken.
-    index = np.unravel_index(int(np.argmax(np.round(norms, 9))), shape)
+    index = np.unravel_index(int(np.argmax(np.round(norms, 9))), norms.shape)
     norm = float(norms[index])
     if best is not None:
         top = np.maximum(top, (best.x, best.y, best.z))
     x, y, z = vector(top)
     if best is not None and norm <= best.norm + 1e-9:
         return replace(best, x=x, y=y, z=z)
+    # Axes on which the gain does not depend are at their first position.
+    shape = np.broadcast_shapes(*(values.shape for values in coordinates.values()))
+    index = (0,) * (len(shape) - norms.ndim) + index
     at = {
         name: float(np.broadcast_to(values, shape)[index]) for name, values in coordinates.items()
     }
@@ -217,11 +220,15 @@ def _sweep(
     linear = [axis.name for axis in axes if axis.is_linear]
     outer, inner = rotary[:1], rotary[1:]
     mesh = dict(zip(inner, np.meshgrid(*(turns[name] for name in inner)), strict=True))
+    rows = max(1, NODES_AT_ONCE // math.prod(len(turns[name]) for name in inner))
     for ends in product(*(dict.fromkeys(ranges[name]) for name in linear)):
-        for first in product(*(turns[name] for name in outer)):
-            fixed = zip((*linear, *outer), (*ends, *first), strict=True)
-            positions = {**mesh, **{name: np.asarray(value) for name, value in fixed}}
-            yield complete_coordinates(model.machine, positions)
+        fixed = {name: np.asarray(end) for name, end in zip(linear, ends, strict=True)}
+        for start in range(0, len(turns[outer[0]]) if outer else 1, rows):
+            first = {
+                name: turns[name][start : start + rows].reshape(-1, *(1 for _ in inner))
+                for name in outer
+            }
+            yield complete_coordinates(model.machine, {**mesh, **fixed, **first})
 
 
 def _default_step(ranges: Mapping[str, tuple[float, float]], rotary: Sequence[str]) -> float:

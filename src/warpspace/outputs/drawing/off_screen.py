@@ -4,7 +4,7 @@ import os
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, reduce
 from importlib import import_module
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -146,8 +146,6 @@ def render_bodies(bodies: Sequence[RenderedBody], projection: Projection) -> Ras
     """Draw bodies; None without bodies."""
     if not bodies:
         return None
-    from scipy.ndimage import maximum_filter
-
     points = np.concatenate([body.vertices_mm for body in bodies])
     spots = projection.project(points)
     low = np.floor(spots.min(axis=0)) - MARGIN_PX
@@ -157,7 +155,9 @@ def render_bodies(bodies: Sequence[RenderedBody], projection: Projection) -> Ras
     small = small and width * height * SUPERSAMPLING**2 <= _LARGEST_AREA_PX
     step = SUPERSAMPLING if small else 1
     rgba, depth = _draw(bodies, projection, (low + high) / 2.0, (width * step, height * step), step)
-    farthest = np.asarray(maximum_filter(depth, 2 * step + 1, mode="nearest"), np.float32)
+    shifts, padded = range(2 * step + 1), np.pad(depth, step, mode="edge")
+    rows = reduce(np.maximum, (padded[shift : shift + len(depth)] for shift in shifts))
+    farthest = reduce(np.maximum, (rows[:, shift : shift + width * step] for shift in shifts))
     return Raster(rgba, depth, farthest, (*low.tolist(), *high.tolist()))
 
 

@@ -6,11 +6,10 @@ Sizes are pixels of a 1600 × 1200 figure; a figure of another size multiplies t
 
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from importlib.resources import files
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from warpspace.analysis.commands.concepts import Concepts
 from warpspace.exceptions import OptionError
 from warpspace.geometry.colour import COMPONENTS
 from warpspace.kinematics.model import Loop
@@ -18,6 +17,9 @@ from warpspace.machine import limits
 from warpspace.picture import model
 from warpspace.picture.formatting import range_words
 from warpspace.scene.model import Scene, common_loop
+
+if TYPE_CHECKING:
+    from warpspace.analysis.commands.concepts import Concepts
 
 REFERENCE_SIZE: Final = (1600, 1200)
 FONT: Final = "DejaVu Sans"
@@ -111,8 +113,7 @@ class FigureSettings:
     # restrictions to state in the figure, for instance "excluded: EA0Z"
     conditions: tuple[str, ...] = ()
     caption: str = ""  # lines of text below the drawing
-    # sampling of machines that are compared side by side
-    concepts: Concepts = field(default_factory=Concepts)
+    concepts: "Concepts | None" = None  # sampling of machines that are compared side by side
     # for a report, which has heading, footer and statistics itself: the figure omits them and has
     # its printed size
     printed: bool = False

@@ -8,8 +8,16 @@ from typing import Any
 import numpy as np
 
 from warpspace.analysis.commands.adjust import ActSet, Adjust
-from warpspace.analysis.commands.concepts import LETTERS, Concept, compare_concepts
+from warpspace.analysis.commands.concepts import (
+    LETTERS,
+    Concept,
+    Concepts,
+    compare_concepts,
+    expected_um,
+)
 from warpspace.bodies.placed import PlacedBody, place_bodies
+from warpspace.field.evaluate import ErrorField
+from warpspace.field.grid import build_grid
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
 from warpspace.outputs.drawing.canvas import Canvas
@@ -29,19 +37,9 @@ from warpspace.outputs.drawing.sheet import (
 )
 from warpspace.outputs.figures.machine_figures import draw_bodies
 from warpspace.outputs.figures.maps import ISOLINE_STEP, isoline_words
-from warpspace.picture.comparison import (
-    CHANGE,
-    STATISTICS,
-    scene_change,
-    share_exaggeration,
-)
+from warpspace.picture.comparison import CHANGE, STATISTICS, scene_change, share_exaggeration
 from warpspace.picture.formatting import LOOP_WORDS, tolerance_words
-from warpspace.picture.model import (
-    DIFFERENCE_LENGTH,
-    ScenePicture,
-    picture_concept,
-    view_words,
-)
+from warpspace.picture.model import DIFFERENCE_LENGTH, ScenePicture, view_words
 from warpspace.scene.model import Scene, common_loop
 from warpspace.units import Array, spell_change, spell_count, spell_fixed, spell_short
 
@@ -154,7 +152,7 @@ CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0
 
 
 def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    plan = replace(settings.concepts, loop=common_loop(scenes, settings.loop))
+    plan = replace(settings.concepts or Concepts(), loop=common_loop(scenes, settings.loop))
     concepts = compare_concepts(scenes, plan)
     pictures = [picture_concept(concept, settings.grid) for concept in concepts]
     pictures = share_colours(replace(settings, component="norm"), pictures)
@@ -189,6 +187,21 @@ def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: b
         scale, "RMS |E|  [µm]", [], [] if settings.printed else rows, (px_per_mm, None)
     )
     return sheet.finish(1.0, maps)
+
+
+def picture_concept(concept: Concept, nodes: int) -> ScenePicture:
+    """Build a picture of the nominal volume, coloured by the RMS of |E| within tolerance."""
+    scene = concept.scene
+    grid = build_grid(scene.model, scene.workspace, nodes)
+    expected, zero = expected_um(concept, grid), np.zeros(grid.nominal_mm.shape)
+    along_x = np.stack([expected, zero[..., 0], zero[..., 0]], axis=-1)
+    return ScenePicture(
+        view=concept.sampled.case.view,
+        grid=grid,
+        field=ErrorField(grid.nominal_mm, along_x, zero),
+        exaggeration=0.0,
+        scene=scene,
+    )
 
 
 def _draw_machines(
