@@ -6,7 +6,7 @@ rotary positions and the loop; a slider move is then one matrix-vector product.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -23,9 +23,10 @@ from warpspace.field.evaluate import ErrorBasis, ErrorField, build_basis
 from warpspace.field.grid import Grid, build_grid, build_slice
 from warpspace.geometry.colour import ColourScale
 from warpspace.machine.axes import parameter
+from warpspace.machine.errors import Constant
 from warpspace.picture import model
 from warpspace.picture.traces import TraceGroup, TraceLines, build_traces
-from warpspace.scene.model import grid_basis
+from warpspace.scene.model import Scene, grid_basis
 from warpspace.units import Array
 
 WITHIN_LIMIT = 0.27  # place on the scale of signed values: colour of values within the limit
@@ -122,7 +123,7 @@ class LiveModel:
             at, point_mm = grid.coordinates, grid.point_mm
             return field_uncertainty(scene, field.error_um, at, state.view(), point_mm)
 
-        key = "uncertainty", Identity(grid), _place(state)
+        key = "uncertainty", Identity(grid), Identity(scene), _place(state)
         uncertainty = CACHE.get(key, build, lambda built: 3 * built.response.nbytes)
         axes, stated = loop_axes(scene.model, state.loop), uncertainty.errors.keys
         unstated = (key for key, value in state.active.items() if value and key not in stated)
@@ -184,7 +185,24 @@ class LiveModel:
 
 
 def _place(state: AppState) -> tuple[object, ...]:
-    return Identity(state.scene), state.grid_nodes, tuple(state.positions.items()), state.view_key
+    inputs = _response_inputs(Identity(state.scene))
+    return inputs, state.grid_nodes, tuple(state.positions.items()), state.view_key
+
+
+@lru_cache(maxsize=64)
+def _response_inputs(of: Identity) -> object:
+    """Return the inputs of responses that come from a scene, but for its amplitudes, as one key."""
+    scene: Scene = of.target
+    unit = {key: curve.with_amplitude(1.0) for key, curve in scene.errors.functions.items()}
+    shapes = tuple((key, at) for key, at in unit.items() if not isinstance(at, Constant))
+    ranges, reference = scene.workspace.ranges.items(), (scene.reference or {}).items()
+    volume = tuple(ranges), tuple(reference), scene.trace_points_mm
+    return _key_of(Identity(scene.model), scene.parameter_keys, shapes, *volume)
+
+
+@lru_cache(maxsize=64)
+def _key_of(*_inputs: object) -> object:
+    return object()  # compared by identity: a table would be hashed with every picture
 
 
 def _size(response: Response) -> int:
