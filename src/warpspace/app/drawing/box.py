@@ -107,8 +107,7 @@ def limit_shapes(picture: LivePicture) -> Shapes:
 
 def _has_ghost(picture: LivePicture) -> bool:
     """Check if the nominal box is drawn: not where it coincides with the actual one."""
-    shift_mm = float(np.abs(picture.drawn_mm - picture.grid.nominal_mm).max())
-    return picture.state.shown.ghost and shift_mm > COINCIDENT * picture.size_mm
+    return picture.state.shown.ghost and picture.shift_mm > COINCIDENT * picture.size_mm
 
 
 class BoxLayer:
