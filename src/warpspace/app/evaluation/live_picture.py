@@ -65,11 +65,6 @@ class LivePicture(Picture):
         return picture_size_mm(self.state.scene, self.grid)
 
     @cached_property
-    def shift_mm(self) -> float:
-        """Largest displacement of a node along x, y or z, as drawn."""
-        return float(np.abs(self.drawn_mm - self.grid.nominal_mm).max())
-
-    @cached_property
     def bench(self) -> SceneOverlay[str] | None:
         """The path of the selected standard test; None where there is none, or it cannot be run."""
         return None if self.is_difference else bench_overlay(self.drawn_state)
