@@ -161,3 +161,23 @@ def test_only_so_many_files_wait_at_once():
         context.receive(Events([do.SetError("EXX", "1")]))
     assert len(context.events) == 2 * MOST_FILES + 3
     assert "at once" in said[0][1]
+
+
+def test_tabs_share_the_responses_of_a_scene_and_are_edited_apart():
+    app = viewer.Viewer(load_scene("dvf5000_first"))
+    with app, dial(app) as socket, dial(app) as other_socket:
+        wire, other_wire = Wire(socket), Wire(other_socket)
+        assert wire.read_until(lambda: wire.is_open, seconds=60.0)
+        assert other_wire.read_until(lambda: other_wire.is_open, seconds=60.0)
+        wire.say(do.SetError("EA0Z", "77"))
+        stores = [session.context.store for session in app.sessions]
+        assert wire.read_until(lambda: any(store.is_edited for store in stores))
+        wire.read_until(lambda: "77" in wire.pieces["error.EA0Z"])
+        pictures = [session.context.picture for session in app.sessions]
+        edited, idle = sorted(pictures, key=lambda of: of.state.amplitudes["EA0Z"] != 77.0)
+        assert edited.state.amplitudes["EA0Z"] == 77.0
+        assert idle.state.amplitudes == idle.state.start
+        assert idle.grid is edited.grid
+        assert all(a.group is b.group for a, b in zip(idle.traces, edited.traces, strict=True))
+        assert idle.field.error_um is not edited.field.error_um
+        end_work(app)

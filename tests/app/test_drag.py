@@ -19,7 +19,10 @@ from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
 from warpspace.formats.compensation.compensate import Compensate, compensate
 from warpspace.formats.compensation.controller import CorrectedPoints
+from warpspace.machine.axes import parameter
+from warpspace.machine.errors import Constant, ErrorSet, Ramp
 from warpspace.scene.library import load_scene
+from warpspace.scene.model import evaluate
 
 FIRST = load_scene("dvf5000_first")
 START = start_state(FIRST, nodes=5)
@@ -199,3 +202,28 @@ def test_the_camera_stays_during_a_drag():
         assert wire.read_until(lambda: session.context.picture.drawn_mm is not drawn)
         assert flights(wire) == 0
         assert wire.toasts == []
+
+
+def test_scenes_that_differ_in_amplitudes_share_their_responses():
+    """A proposal is evaluated after every change; its responses are those of the scene."""
+    errors = FIRST.errors
+    key = next(key for key in errors if isinstance(errors.functions[key], Ramp))
+    span = FIRST.axis_span(parameter(key).axis)
+    shown = LIVE.evaluate(START)
+    other = replace(FIRST, errors=errors.with_amplitude(key, 7.0, span), title="other amplitude")
+    shared = LIVE.evaluate(start_state(other, nodes=5))
+    assert shared.grid is shown.grid
+    exact = evaluate(other, grid=5)
+    np.testing.assert_allclose(shared.field.error_um, exact.error_um, rtol=0.0, atol=1e-9)
+    assert not np.allclose(shared.field.error_um, shown.field.error_um)
+    bent = ErrorSet({**errors.functions, key: Constant(span, 7.0)})
+    for changed in (
+        replace(FIRST, errors=bent),
+        replace(FIRST, reference={"X": 0.0, "Y": 0.0, "Z": -300.0}),
+        replace(FIRST, workspace=FIRST.workspace.moved({"C": 30.0})),
+    ):
+        own = LIVE.evaluate(start_state(changed, nodes=5))
+        assert own.grid is not shown.grid
+        np.testing.assert_allclose(
+            own.field.error_um, evaluate(changed, grid=5).error_um, rtol=0.0, atol=1e-9
+        )

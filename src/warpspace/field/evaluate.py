@@ -73,6 +73,9 @@ class ErrorField:
         return grids.cell_values(self.norm_um)
 
 
+PIECE = 14_000  # numbers of a sum of responses that stay in the processor cache
+
+
 @dataclass(frozen=True, slots=True)
 class ErrorBasis:
     """First-order response of a batch of points to every parameter."""
@@ -101,11 +104,14 @@ class ErrorBasis:
             return (amplitudes @ flat).reshape(self.nominal_mm.shape)
         if not len(used):
             return np.zeros(self.nominal_mm.shape)
-        total = flat[used[0]] * amplitudes[used[0]]
-        part = np.empty_like(total)
-        for index in used[1:]:
-            np.multiply(flat[index], amplitudes[index], out=part)
-            total += part
+        total = np.empty(self.nominal_mm.size)
+        for start in range(0, total.size, PIECE):
+            part, responses = total[start : start + PIECE], flat[:, start : start + PIECE]
+            np.multiply(responses[used[0]], amplitudes[used[0]], out=part)
+            product = np.empty_like(part)
+            for index in used[1:]:
+                np.multiply(responses[index], amplitudes[index], out=product)
+                part += product
         return total.reshape(self.nominal_mm.shape)
 
     def contributions(self, amplitudes: Array, index: tuple[int, ...] = ()) -> Array:

@@ -107,8 +107,12 @@ def limit_shapes(picture: LivePicture) -> Shapes:
 
 def _has_ghost(picture: LivePicture) -> bool:
     """Check if the nominal box is drawn: not where it coincides with the actual one."""
-    shift_mm = float(np.abs(picture.drawn_mm - picture.grid.nominal_mm).max())
-    return picture.state.shown.ghost and shift_mm > COINCIDENT * picture.size_mm
+    drawn, nominal = (at.reshape(-1, 3) for at in (picture.drawn_mm, picture.grid.nominal_mm))
+    worst = picture.worst_node  # mostly suffices
+    return picture.state.shown.ghost and any(
+        float(np.abs(drawn[nodes] - nominal[nodes]).max()) > COINCIDENT * picture.size_mm
+        for nodes in (slice(worst, worst + 1), slice(None))
+    )
 
 
 class BoxLayer:

@@ -25,7 +25,7 @@ class Cache(Generic[T]):
                 return cached[0]
         value = build()
         with self._lock:
-            self._items[key] = (value, size(value))
+            value, _ = self._items.setdefault(key, (value, size(value)))  # another may be first
             while (
                 len(self._items) > 1 and sum(n for _, n in self._items.values()) > self.limit_bytes
             ):

@@ -6,7 +6,7 @@ rotary positions and the loop; a slider move is then one matrix-vector product.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -22,10 +22,12 @@ from warpspace.app.state.look import slice_positions
 from warpspace.field.evaluate import ErrorBasis, ErrorField, build_basis
 from warpspace.field.grid import Grid, build_grid, build_slice
 from warpspace.geometry.colour import ColourScale
+from warpspace.geometry.surfaces import auto_exaggeration
 from warpspace.machine.axes import parameter
+from warpspace.machine.errors import Constant
 from warpspace.picture import model
 from warpspace.picture.traces import TraceGroup, TraceLines, build_traces
-from warpspace.scene.model import grid_basis
+from warpspace.scene.model import Scene, grid_basis
 from warpspace.units import Array
 
 WITHIN_LIMIT = 0.27  # place on the scale of signed values: colour of values within the limit
@@ -51,32 +53,30 @@ class LiveModel:
     """Evaluates states into pictures; shared by all sessions, thread-safe."""
 
     def evaluate(self, state: AppState, drawn: DrawnScale | None = None) -> LivePicture:
-        if drawn is not None:
-            drawn_state = replace(state, exaggeration=drawn.exaggeration)
-            picture = self._evaluate(drawn_state, drawn.amplitudes)
-            colours, slices = drawn.colours, picture.slices
-            if colours is not None:
-                slices = tuple(replace(piece, colours=colours) for piece in slices)
-            return replace(picture, state=state, colours=colours or picture.colours, slices=slices)
-        return self._evaluate(state)
+        if not state.comparison.b:
+            return self._single(state, drawn)
+        if drawn is None:
+            return compare_pictures(self._single, state)
+        drawn_state = replace(state, exaggeration=drawn.exaggeration)
+        picture = compare_pictures(partial(self._single, drawn=drawn), drawn_state)
+        if drawn.colours is None:
+            return replace(picture, state=state)
+        slices = tuple(replace(piece, colours=drawn.colours) for piece in picture.slices)
+        return replace(picture, state=state, colours=drawn.colours, slices=slices)
 
-    def _evaluate(self, state: AppState, start: Start = None) -> LivePicture:
-        single = partial(self._single, start=start)
-        return compare_pictures(single, state) if state.comparison.b else single(state)
-
-    def _single(self, state: AppState, start: Start) -> LivePicture:
-        rotary = state.rotary
+    def _single(self, state: AppState, drawn: DrawnScale | None = None) -> LivePicture:
+        rotary, start = state.rotary, drawn and drawn.amplitudes
         key = _place(state), rotary.off, rotary.own_mm, tuple(rotary.held.items())
         response: Response = CACHE.get(key, lambda: _build(state), _size)
         (grid, basis), *traces = response
-        size = model.picture_size_mm(state.scene, grid)
         field = self._field(state, grid, basis, start)
         errors = [self._field(state, group, own, start).error_um for group, own in traces]
-        drawn = errors if state.shows_rotary else [field.error_um]
-        largest = max(
-            (float(np.linalg.norm(e, axis=-1).max(initial=0.0)) for e in drawn), default=0
-        )
-        factor = model.choose_exaggeration(state.exaggeration, None, largest, size)
+        factor = model.fixed_exaggeration(drawn.exaggeration if drawn else state.exaggeration, None)
+        if factor is None:
+            traced_um = [np.linalg.norm(error, axis=-1) for error in errors]
+            lengths_um = traced_um if state.shows_rotary else [field.norm_um]
+            largest = max((float(of.max(initial=0.0)) for of in lengths_um), default=0.0)
+            factor = auto_exaggeration(largest, model.picture_size_mm(state.scene, grid))
         uncertainty, quantity = self._uncertainty(state, grid, field), state.look.quantity
         if state.shows_rotary:
             quantity = "position"
@@ -107,7 +107,8 @@ class LiveModel:
             state=state,
             traces=traced,
         )
-        common["colours"] = _chosen_colours(state, picture, basis)
+        colours = drawn and drawn.colours
+        common["colours"] = colours or _chosen_colours(state, picture, basis)
         slices = tuple(self._slices(state, common, start))
         return replace(picture, colours=common["colours"], slices=slices)
 
@@ -122,7 +123,7 @@ class LiveModel:
             at, point_mm = grid.coordinates, grid.point_mm
             return field_uncertainty(scene, field.error_um, at, state.view(), point_mm)
 
-        key = "uncertainty", Identity(grid), _place(state)
+        key = "uncertainty", Identity(grid), Identity(scene), _place(state)
         uncertainty = CACHE.get(key, build, lambda built: 3 * built.response.nbytes)
         axes, stated = loop_axes(scene.model, state.loop), uncertainty.errors.keys
         unstated = (key for key, value in state.active.items() if value and key not in stated)
@@ -184,7 +185,24 @@ class LiveModel:
 
 
 def _place(state: AppState) -> tuple[object, ...]:
-    return Identity(state.scene), state.grid_nodes, tuple(state.positions.items()), state.view_key
+    inputs = _response_inputs(Identity(state.scene))
+    return inputs, state.grid_nodes, tuple(state.positions.items()), state.view_key
+
+
+@lru_cache(maxsize=64)
+def _response_inputs(of: Identity) -> object:
+    """Return the inputs of responses that come from a scene, but for its amplitudes, as one key."""
+    scene: Scene = of.target
+    unit = {key: curve.with_amplitude(1.0) for key, curve in scene.errors.functions.items()}
+    shapes = tuple((key, at) for key, at in unit.items() if not isinstance(at, Constant))
+    ranges, reference = scene.workspace.ranges.items(), (scene.reference or {}).items()
+    volume = tuple(ranges), tuple(reference), scene.trace_points_mm
+    return _key_of(Identity(scene.model), scene.parameter_keys, shapes, *volume)
+
+
+@lru_cache(maxsize=64)
+def _key_of(*_inputs: object) -> object:
+    return object()  # compared by identity: a table would be hashed with every picture
 
 
 def _size(response: Response) -> int:
