@@ -102,8 +102,6 @@ def _effect(scene: Scene, adjuster: Adjuster) -> dict[str, ErrorFunction]:
 
 def _bent(members: Sequence[Adjuster], travel_um: Array, origin_mm: Array) -> SupportMotion:
     """Compute the motion of a carriage on a bed or guide that supports bend by their travels."""
-    from scipy.interpolate import CubicSpline
-
     placed = support_rows(members)
     if placed is None:
         raise OptionError(f"{members[0].name}: its supports form no rows along x, y or z")
@@ -111,21 +109,39 @@ def _bent(members: Sequence[Adjuster], travel_um: Array, origin_mm: Array) -> Su
     normal = np.array(members[0].direction)
     at = np.array([adjuster.at_mm for adjuster in members])
     s, t = axes @ at.T
-    along, aside = axes @ origin_mm.T
-    curves: list[Array] = []  # height and slope, [2, m]
-    for row in map(list, rows):
-        spline = CubicSpline(s[row], travel_um[row], bc_type="natural")
-        inside = np.clip(along, *s[row][[0, -1]])
-        row_slope = spline(inside, 1)
-        curves.append(np.array([spline(inside) + row_slope * (along - inside), row_slope]))
-    (height, slope), across = curves[0], np.zeros(len(along))
+    place = origin_mm @ axes.T
+    curves = [_spline(s[list(row)], travel_um[list(row)], place[:, 0]) for row in rows]
+    (height, slope), (other_height, other_slope) = curves[0], curves[-1]
+    across, share = np.zeros_like(height), 0.0
     if len(rows) > 1:
         first, last = (float(t[list(row)].mean()) for row in rows)
-        across, twist = (curves[1] - curves[0]) / (last - first)
-        height, slope = height + across * (aside - first), slope + twist * (aside - first)
+        across, share = (other_height - height) / (last - first), (place[:, 1] - first)
+        share /= last - first
+    height, slope = (a + share * (b - a) for a, b in ((height, other_height), (slope, other_slope)))
     turn = np.cross(np.column_stack([slope, across]) @ axes, normal) * URAD_PER_UM_OVER_MM
     lever = (origin_mm - at.mean(axis=0)) @ normal
     return SupportMotion(origin_mm - lever[:, None] * normal, height[:, None] * normal, turn)
+
+
+def _spline(at: Array, height: Array, place: Array) -> tuple[Array, Array]:
+    """Evaluate the natural cubic spline through supports, and its slope; linear beyond them.
+
+    Moments m, the second derivatives at the supports, continue the slope: with intervals h,
+    h₋ m₋ + 2 (h₋ + h₊) m + h₊ m₊ = 6 (Δ₊ / h₊ − Δ₋ / h₋), and m is zero at both ends.
+    """
+    width, rise = np.diff(at), np.diff(height) / np.diff(at)
+    moment = np.zeros(len(at))
+    if len(at) > 2:
+        inner = width[1:-1]
+        matrix = np.diag(2.0 * (width[:-1] + width[1:])) + np.diag(inner, 1) + np.diag(inner, -1)
+        moment[1:-1] = np.linalg.solve(matrix, 6.0 * np.diff(rise))
+    inside = np.clip(place, at[0], at[-1])
+    interval = np.clip(np.searchsorted(at, inside, "right") - 1, 0, len(width) - 1)
+    h, d, m, n = width[interval], inside - at[interval], *moment[[interval, interval + 1]]
+    start = rise[interval] - h * (2.0 * m + n) / 6.0
+    slope = start + d * m + d * d * (n - m) / (2.0 * h)
+    value = height[interval] + d * (start + d * (m / 2.0 + d * (n - m) / (6.0 * h)))
+    return value + slope * (place - inside), slope
 
 
 def _frames(model: Model, axis: str, position: Array) -> AxisFrames:

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
+from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,8 +151,7 @@ class Diagnostics:
             for members in (*((cause,) for cause in count), *combinations(count, 2))
             for factor in FACTORS
         ]
-        pairs = len(causes) * (len(causes) - 1) / 2.0
-        priors = {1: PRIOR_ONE / len(causes), 2: PRIOR_TWO / max(pairs, 1.0)}
+        priors = {1: PRIOR_ONE / len(causes), 2: PRIOR_TWO / max(comb(len(causes), 2), 1)}
         logs = [np.log(priors[len(h.causes)] / len(FACTORS)) for h in self.hypotheses]
         self.log_priors = np.array([*logs, np.log(PRIOR_WITHIN)])
 

@@ -309,7 +309,6 @@ class ReportComparison(Result):
             yield f"  |E_n| ≤ 1 for {agreeing:,} of {len(compared):,} measurands (ISO/IEC 17043)"
         elif self.report.deviation_mm is not None:
             yield "  no E_n: an uncertainty is unknown (± ?), of the errors or of the measurement"
-        ordered = sorted(self.measured, key=_importance)
         columns = (
             Column("measurand", key="measurand", leads=True, wraps=True),
             Column("unit", key="unit"),
@@ -322,7 +321,7 @@ class ReportComparison(Result):
         rows = [
             (f"{row.name} {row.measure}", row.unit, row.predicted_um, row.u95_predicted_um,
              row.measured_um, row.u95_measured_um, row.en)
-            for row in ordered
+            for row in sorted(self.measured, key=_importance)
         ]  # fmt: skip
         shown = [
             (*row[:3], plus_minus(row[3]), row[4], plus_minus(row[5]), row[6])

@@ -299,11 +299,8 @@ class Adjust(description.Analysis):
             sets.append(
                 ActSet(
                     *volume_statistics(field, grid).four,
-                    acts=plan.acts,
+                    **plan._asdict(),
                     adjust=adjust,
-                    errors=plan.errors,
-                    error_um=plan.error_um,
-                    proven=plan.proven,
                     exact=Summary(*exact.four),
                 )
             )
