@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from fractions import Fraction
 
 import numpy as np
 
@@ -83,6 +82,8 @@ def spell_act(adjuster: Adjuster, name: str, change: float) -> str:
     sign, size = "+" if change > 0.0 else "−", f"{abs(change):.6g}"
     um = "" if adjuster.kind.is_parameter else f" ({abs(change) * adjuster.travel_per_unit:.4g} µm)"
     if adjuster.unit == "turn":
+        from fractions import Fraction  # few commands need it
+
         turns, fraction = divmod(Fraction(abs(change)).limit_denominator(MAX_DENOMINATOR), 1)
         if abs(float(turns + fraction) - abs(change)) < adjuster.step / 100.0:
             size = " ".join(str(number) for number in (turns, fraction) if number)

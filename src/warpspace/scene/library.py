@@ -6,8 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
-from typing import Any, cast
-from zipfile import ZipFile
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -36,6 +35,9 @@ from warpspace.scene.notes import TOLERANCES, Note
 from warpspace.scene.scene_writer import Notation, convert_covariance, matrix_digest, read_errors
 from warpspace.scene.schema import Problems
 from warpspace.scene.text_files import one_line, parse_toml, read_bytes, read_text
+
+if TYPE_CHECKING:
+    from zipfile import ZipFile
 
 
 def scene_names() -> tuple[str, ...]:
@@ -274,6 +276,8 @@ NPZ_ARRAYS = {"keys.npy": (1, "U", 4 * 64), "matrix.npy": (2, "fiu", 8)}
 
 def read_npz(path: Path, where: str, problems: Problems) -> dict[str, Any] | None:
     """Read the arrays of a covariance as lists; note a problem for any other file."""
+    from zipfile import ZipFile
+
     data = BytesIO(read_bytes(path, limits.MAX_SCENE_BYTES))
     with suppress(Exception), ZipFile(data) as packed:  # any error of a damaged file
         if {"matrix.npy"} <= {*packed.namelist()} <= {*NPZ_ARRAYS}:
@@ -282,7 +286,7 @@ def read_npz(path: Path, where: str, problems: Problems) -> dict[str, Any] | Non
     return None
 
 
-def _read_array(packed: ZipFile, name: str) -> list[Any]:
+def _read_array(packed: "ZipFile", name: str) -> list[Any]:
     """Read an array with the dimensions and kinds of a covariance."""
     dimensions, kinds, max_bytes = NPZ_ARRAYS[name]
     with packed.open(name) as file:
