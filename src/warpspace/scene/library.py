@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import IO, Any, cast
 
 import numpy as np
 
@@ -35,9 +35,6 @@ from warpspace.scene.notes import TOLERANCES, Note
 from warpspace.scene.scene_writer import Notation, convert_covariance, matrix_digest, read_errors
 from warpspace.scene.schema import Problems
 from warpspace.scene.text_files import one_line, parse_toml, read_bytes, read_text
-
-if TYPE_CHECKING:
-    from zipfile import ZipFile
 
 
 def scene_names() -> tuple[str, ...]:
@@ -281,15 +278,15 @@ def read_npz(path: Path, where: str, problems: Problems) -> dict[str, Any] | Non
     data = BytesIO(read_bytes(path, limits.MAX_SCENE_BYTES))
     with suppress(Exception), ZipFile(data) as packed:  # any error of a damaged file
         if {"matrix.npy"} <= {*packed.namelist()} <= {*NPZ_ARRAYS}:
-            return {name[:-4]: _read_array(packed, name) for name in packed.namelist()}
+            return {name[:-4]: _read_array(packed.open(name), name) for name in packed.namelist()}
     problems.add(where, "expected a file of numpy with the arrays keys and matrix", path.name)
     return None
 
 
-def _read_array(packed: "ZipFile", name: str) -> list[Any]:
+def _read_array(member: IO[bytes], name: str) -> list[Any]:
     """Read an array with the dimensions and kinds of a covariance."""
     dimensions, kinds, max_bytes = NPZ_ARRAYS[name]
-    with packed.open(name) as file:
+    with member as file:
         is_usual = np.lib.format.read_magic(file) == (1, 0)
         shape, is_fortran, dtype = np.lib.format.read_array_header_1_0(file, max_header_size=1000)
         fits = len(shape) == dimensions and max(shape) <= limits.MAX_COVARIANCE
