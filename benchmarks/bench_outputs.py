@@ -1,5 +1,10 @@
-"""Files: a field of a million nodes, exports, reports; their time, their memory, their size."""
+"""Files: a field of a million nodes, exports, reports; their time, their memory, their size.
 
+And the page that `warpspace.show` builds for a notebook, which is a file in its outputs.
+"""
+
+import contextlib
+import io
 import tempfile
 from functools import partial
 from pathlib import Path
@@ -8,10 +13,12 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
+import trimesh
+import viser
 from table import Row, Section
 from timing import cheapest, in_turns, python, warpspace
 
-from warpspace import evaluate, load_scene
+from warpspace import Scene, evaluate, load_scene, show, to_pyvista
 from warpspace.field.grid import build_grid
 from warpspace.outputs.exports.fields import FIELD_ENDINGS, FieldRecord, write_field
 
@@ -59,6 +66,37 @@ def peers(record: FieldRecord, folder: Path) -> dict[str, tuple[str, partial]]:
         ".npz": ("numpy.savez", partial(np.savez, folder / "p.npz", **arrays)),
         ".csv": ("pandas to_csv, nine digits", csv),
     }
+
+
+def coloured_surface(scene: Scene) -> trimesh.Trimesh:
+    """Build the surface of the deformed volume, grey levels for |E|."""
+    surface = to_pyvista(scene)["deformed"].extract_surface(algorithm="dataset_surface")
+    surface = surface.triangulate()
+    levels = 255.0 * surface["norm_um"] / surface["norm_um"].max()
+    colours = np.repeat(levels.astype(np.uint8)[:, None], 3, axis=1)
+    return trimesh.Trimesh(surface.points, surface.regular_faces, vertex_colors=colours)
+
+
+def viser_page(surface: trimesh.Trimesh) -> str:
+    """Build viser's page with a surface and nothing else."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        server.scene.add_mesh_trimesh("/volume", surface)
+        page = server.scene.as_html()
+        server.stop()
+    return page
+
+
+def notebook_rows(scene: Scene) -> list[Row]:
+    """Measure what a notebook displays, once its modules are loaded."""
+    surface = coloured_surface(scene)
+    page, bare = show(scene)._repr_html_(), viser_page(surface)
+    took, other = in_turns(lambda: show(scene)._repr_html_(), lambda: viser_page(surface))
+    baseline = "viser's page with the surface alone"
+    return [
+        Row("warpspace.show in a notebook", took, baseline, other),
+        Row("warpspace.show in a notebook, size", len(page) / 1e6, baseline, len(bare) / 1e6, "MB"),
+    ]
 
 
 def measure() -> Section:
@@ -109,9 +147,11 @@ def measure() -> Section:
                     max_value=size,
                 )
             )
+    rows += notebook_rows(load_scene("dvf5000_first"))
     text = (
         "Whole commands with everything they load, beside the start of Python with numpy; fields"
         " also beside what else writes the same numbers, which holds the whole table. Processor"
-        " time counts the renderer's process and its threads too."
+        " time counts the renderer's process and its threads too. What a notebook shows is built in"
+        " a process that has its modules, and holds the drawing, its labels and the controls."
     )
     return Section("Files", text, rows)

@@ -6,7 +6,6 @@ was given, what was expected and, where there is one, the near miss.
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from difflib import get_close_matches
 
 SHOWN_PROBLEMS = 40  # problems of a file that a message lists; it counts the others
 _DIGITS = re.compile(r"(\d{10})[\d.,_]{20,}(\d{10})")
@@ -92,6 +91,8 @@ class SceneError(WarpspaceError):
 
 
 def near_miss(name: str, expected: Iterable[str]) -> str:
+    from difflib import get_close_matches  # only messages need it
+
     names = list(expected)
     folded = {candidate.casefold(): candidate for candidate in names}
     close = get_close_matches(name.casefold(), folded, n=2, cutoff=0.6)

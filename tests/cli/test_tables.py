@@ -10,6 +10,7 @@ from collections import Counter
 from contextlib import contextmanager
 
 import pytest
+from rich.cells import cell_len
 
 from warpspace.analysis.blocks import Column, number_columns
 from warpspace.cli import tables as module
@@ -98,6 +99,30 @@ def test_numbers_are_aligned_at_the_right_below_heading_and_unit(capsys):
         "  A      1.50  12.25",
         "  BB   -10.00   3.00",
     ]
+
+
+def test_a_table_that_fits_is_drawn_as_by_rich():
+    columns = (Column("key"), *number_columns(("mean", "max"), ".2f", "µm"), Column("", wraps=True))
+    rows = [("A  b", "−1.50 ", "12.25", "two words"), ("√Δ", "", "3", "  x\ny")] * 41
+    drawn = module._draw(columns, rows, 2, 40)
+    assert drawn.count("key") == 3
+    heads = [["\nkey", "mean\n[µm]", "max\n[µm]", "\n"]]
+    repeated = [*heads, *rows[:40], [""] * 4, *heads, *rows[40:80], [""] * 4, *heads, *rows[80:]]
+    assert drawn == module._draw_wrapped(columns, repeated, 2, 40, has_header=True)
+
+
+def test_a_narrow_character_takes_one_cell():
+    characters = [chr(code) for code in range(0x110000) if module._NARROW.fullmatch(chr(code))]
+    assert {*"A~µ°±−²Δ…√≤"} < {*characters}
+    assert {cell_len(character) for character in characters if character != "\n"} == {1}
+
+
+def test_a_heading_is_bold_in_a_terminal(monkeypatch):
+    monkeypatch.setattr("sys.stdout", Terminal())
+    for term, is_bold in (("xterm", True), ("dumb", False)):
+        monkeypatch.setenv("TERM", term)
+        head, row = module._draw((Column("key"),), [("A",)], 2, 40).splitlines()
+        assert (head, row) == ("\x1b[1mkey\x1b[0m" if is_bold else "key", "A")
 
 
 def test_a_wide_table_goes_on_below_with_its_first_columns(capsys, monkeypatch):

@@ -79,6 +79,8 @@ RENDERERS = "viser pyvista vtkmodules matplotlib trimesh"
         ("", f"numpy scipy {RENDERERS}"),
         # half of what the command took was scipy.stats, which only uncertainties need
         ("field dvf5000_first --at X=0", f"scipy.stats pandas pyarrow {RENDERERS}"),
+        ("field dvf5000_first --at X=0", "rich importlib.metadata numpy.random numpy.polynomial"),
+        ("field dvf5000_first --at X=0", "zipfile fractions difflib warpspace.outputs.file_output"),
         ("field dvf5000_first --grid 3 -o x.npz", f"scipy.stats pandas pyarrow {RENDERERS}"),
         (
             "draw dvf5000_first --grid 3 -o x.png",

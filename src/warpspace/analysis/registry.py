@@ -4,7 +4,6 @@ Analyses are imported when they are used, so that the list costs no start-up tim
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
@@ -142,8 +141,7 @@ class PrintedNumber(NamedTuple):
     quotation: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class Publication:
+class Publication(NamedTuple):
     """Numbers that a publication gives; each function returns nothing for other machines."""
 
     name: str  # heading of a column, mark of a chart, start of a key of a CSV file

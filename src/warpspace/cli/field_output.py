@@ -54,7 +54,9 @@ def print_field(
         places = axes if nodes is None else None
         estimate: dict[str, float] = {}
         if not exact:
-            estimate = shared_options.warn_second_order(model.second_order(loaded, loop, at=places))
+            first = result if nodes is None and frame == model.FRAMES[0] else None
+            orders = model.second_order(loaded, loop, at=places, first=first)
+            estimate = shared_options.warn_second_order(orders)
         node_statistics = statistics(result, axes)
         u95 = {}
         if nodes is None:

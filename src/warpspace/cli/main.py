@@ -57,11 +57,6 @@ TASK_OF_BUNDLED: "dict[str, Task]" = {
 }
 
 
-def task_of(name: str) -> "Task":
-    tasks: dict[str, Task] = {entry.name: entry.task for entry in entries()}
-    return (TASK_OF_BUNDLED | tasks).get(name, "machine")
-
-
 def _build(name: str) -> click.Command:
     if name not in TASK_OF_BUNDLED:  # plug-ins are looked for only where they may matter
         return command_of({entry.name: entry for entry in entries()}[name].load())
@@ -86,13 +81,14 @@ class TaskGroup(click.Group):
     """The commands under headings by task; analyses are listed without being imported."""
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        sentences = {entry.name: entry.sentence for entry in entries()}
+        analyses = {entry.name: entry for entry in entries()}
         tasks: dict[str, list[tuple[str, str]]] = {words: [] for words in TASKS.values()}
         room = formatter.width - 6 - max(map(len, self.commands))
         for name in self.list_commands(ctx):
-            is_made = name in sentences
-            command = click.Command(name, help=sentences[name]) if is_made else self.commands[name]
-            tasks[TASKS[task_of(name)]].append((name, command.get_short_help_str(room)))
+            entry = analyses.get(name)
+            command = click.Command(name, help=entry.sentence) if entry else self.commands[name]
+            task = entry.task if entry else TASK_OF_BUNDLED.get(name, "machine")
+            tasks[TASKS[task]].append((name, command.get_short_help_str(room)))
         for heading, rows in tasks.items():
             if rows:
                 with formatter.section(heading):

@@ -29,9 +29,7 @@ WIDTH_ELSEWHERE = 80  # characters per line if the output is no terminal
 READABLE = 20  # characters per line of a text column before other columns move below
 REPEATED = 40  # rows after which headings repeat
 Row = Sequence[str]
-_NARROW = re.compile(
-    "[\n -~\xa0-\xac\xae-\u02ff\u0370-\u0482\u2010-\u2027\u2070-\u20c0\u2100-\u2319]*"
-)
+_NARROW = re.compile("[\n -~\xa0-\xac\xae-\u02ff\u0370-\u0482\u2010-\u2027\u2100-\u2319]*")
 """Texts whose characters all take one cell of a terminal."""
 _UNBROKEN_SPACES = re.compile(r"(?<=\d) (?=[µm°%])|(?<= [A-Z]) (?=[-+\d])")
 """Spaces without a line break: number and unit, axis and position."""

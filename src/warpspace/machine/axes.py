@@ -10,9 +10,9 @@ rotations about them.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
+from typing import NamedTuple
 
 from warpspace.exceptions import UnknownNameError
 from warpspace.units import MICROMETRE, MICRORADIAN
@@ -110,8 +110,7 @@ class ErrorKind(StrEnum):
     LOCATION = "location error"
 
 
-@dataclass(frozen=True, slots=True)
-class Parameter:
+class Parameter(NamedTuple):
     """One error parameter."""
 
     key: str  # ISO 230-1 name in ASCII

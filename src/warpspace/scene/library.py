@@ -6,8 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
-from typing import Any, cast
-from zipfile import ZipFile
+from typing import IO, Any, cast
 
 import numpy as np
 
@@ -274,18 +273,20 @@ NPZ_ARRAYS = {"keys.npy": (1, "U", 4 * 64), "matrix.npy": (2, "fiu", 8)}
 
 def read_npz(path: Path, where: str, problems: Problems) -> dict[str, Any] | None:
     """Read the arrays of a covariance as lists; note a problem for any other file."""
+    from zipfile import ZipFile
+
     data = BytesIO(read_bytes(path, limits.MAX_SCENE_BYTES))
     with suppress(Exception), ZipFile(data) as packed:  # any error of a damaged file
         if {"matrix.npy"} <= {*packed.namelist()} <= {*NPZ_ARRAYS}:
-            return {name[:-4]: _read_array(packed, name) for name in packed.namelist()}
+            return {name[:-4]: _read_array(packed.open(name), name) for name in packed.namelist()}
     problems.add(where, "expected a file of numpy with the arrays keys and matrix", path.name)
     return None
 
 
-def _read_array(packed: ZipFile, name: str) -> list[Any]:
+def _read_array(member: IO[bytes], name: str) -> list[Any]:
     """Read an array with the dimensions and kinds of a covariance."""
     dimensions, kinds, max_bytes = NPZ_ARRAYS[name]
-    with packed.open(name) as file:
+    with member as file:
         is_usual = np.lib.format.read_magic(file) == (1, 0)
         shape, is_fortran, dtype = np.lib.format.read_array_header_1_0(file, max_header_size=1000)
         fits = len(shape) == dimensions and max(shape) <= limits.MAX_COVARIANCE

@@ -292,10 +292,11 @@ def second_order(
     loop: Loop | str | None = None,
     *,
     at: Mapping[str, ArrayLike] | None = None,
+    first: ErrorField | None = None,
 ) -> SecondOrder:
-    """Compare the first order with the exact chain, over the grid unless at points."""
+    """Compare the first order, if it is known, with the exact chain, over the grid or at points."""
     nodes = CHECK_NODES if at is None else None
-    first = evaluate(scene, at=at, grid=nodes, loop=loop)
+    first = evaluate(scene, at=at, grid=nodes, loop=loop) if first is None else first
     exact = evaluate(scene, at=at, grid=nodes, loop=loop, exact=True)
     return compare_orders(first.error_um, exact.error_um)
 

@@ -8,7 +8,6 @@ import re
 import sys
 import time as clock
 import tomllib
-import zipfile
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from datetime import date, time
@@ -141,7 +140,7 @@ def _sheet_text(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
     """Read the first sheet of a spreadsheet as a table with semicolons."""
     expected = "a sheet that is saved as CSV"
     try:
-        reader = import_module("python_calamine")
+        zipfile, reader = import_module("zipfile"), import_module("python_calamine")
     except ImportError:
         problem = f"is a spreadsheet; expected the package python-calamine, or {expected}"
         raise SceneError(name, [problem]) from None

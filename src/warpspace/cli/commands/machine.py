@@ -13,6 +13,7 @@ from warpspace.cli.analyses import print_blocks
 from warpspace.cli.file_arguments import OutputFile, SceneName
 from warpspace.cli.tables import print_table, print_text, progress
 from warpspace.exceptions import OptionError
+from warpspace.plugins import load_plugins
 
 if TYPE_CHECKING:
     from warpspace.analysis.registry import PrintedNumber
@@ -33,6 +34,7 @@ def list_(kind: Kind | None, *, as_json: bool) -> None:
 
     A scene refers to a machine by name, machine = "scara"; the scene machine_NAME shows it.
     """
+    load_plugins()  # reports those that cannot be loaded
     kinds: tuple[Kind, ...] = ("scenes", "machines") if kind is None else (kind,)
     listing = {kind_name: _list_kind(kind_name) for kind_name in kinds}
     if as_json:

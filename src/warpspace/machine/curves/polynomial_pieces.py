@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
-from numpy.polynomial import Chebyshev, Polynomial
 
 from warpspace.exceptions import OptionError
 from warpspace.machine.curves import curve
@@ -154,7 +153,8 @@ def _fit(evaluate: Callable[[Array], Array], at: Array) -> tuple[Array, Array]:
 def _power_matrix() -> Array:
     rows = np.zeros((DEGREE + 1, DEGREE + 1))
     for k in range(DEGREE + 1):
-        rows[: k + 1, k] = Chebyshev.basis(k, domain=[0.0, 1.0]).convert(kind=Polynomial).coef
+        basis = np.polynomial.Chebyshev.basis(k, domain=[0.0, 1.0])
+        rows[: k + 1, k] = basis.convert(kind=np.polynomial.Polynomial).coef
     return rows
 
 
@@ -168,7 +168,8 @@ def _simplest(span: curve.Span, at: Array, coefficients: Array) -> curve.ErrorFu
     if degree == 0 and np.ptp(significant[:, 0]) <= SMALL:
         return Constant(span, float(significant[:, 0].mean()))
     if len(significant) == 1:
-        shifted = Polynomial(significant[0, : degree + 1])(Polynomial([-at[0], 1.0]))
+        polynomial = np.polynomial.Polynomial
+        shifted = polynomial(significant[0, : degree + 1])(polynomial([-at[0], 1.0]))
         return Poly(span, tuple(shifted.coef.tolist()))
     rows = tuple(tuple(float(c) for c in row[: degree + 1]) for row in significant)
     return Pieces(span, tuple(at[:-1].tolist()), float(at[-1]), rows)
