@@ -40,6 +40,7 @@ from websockets.asyncio.server import ServerConnection
 
 from warpspace.app.browser.page import page_script
 from warpspace.app.browser.viser_private import send_script
+from warpspace.app.drawing.box import SURFACE
 from warpspace.app.drawing.shapes import light_scene
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.server.session import Session
@@ -61,23 +62,27 @@ CHROMIUM = [
     "--disable-sync",
 ]
 # viser would reject the events of the page's own scripts and end the connection
-SILENT = """{
-  const view = window.__viserMutable, send = view.sendMessage;
-  view.sendMessage = message => { if (message.type !== 'WarpspaceEvents') send(message); };
-}"""
+SILENT = "warpspaceViser.send = () => {};"
 SETTLED_MS = 1500  # until what follows at rest has been sent and drawn, too
 MOVE = """async ([uuid, action, value]) => {
-  const m = window.__viserMutable, { bend } = warpspaceMesh;
-  const bent = new Promise((done, fail) => {
-    warpspaceMesh.bend = function (...given) { bend.apply(this, given); done(); };
-    setTimeout(() => fail(new Error('nothing moved')), 60000);
-  });
-  const start = performance.now();
+  const frame = () => new Promise(requestAnimationFrame);
+  const shape = () => {  // changes with new points, and with a new node of viser
+    const parts = [];
+    warpspaceViser.node('/box/surface')?.traverse(part => {
+      const at = part.isMesh && part.geometry.attributes.position;
+      if (at) parts.push(part.geometry.uuid, at.version);
+    });
+    return parts.join();
+  };
+  const before = shape(), m = window.__viserMutable, start = performance.now();
   if (uuid) m.sendMessage({type: 'GuiUpdateMessage', uuid, updates: {value: String(value)}});
   else warpspacePage.send(action, value);
-  await bent;
-  warpspaceMesh.bend = bend;
-  // viser has drawn it in the same callback; reading waits until the renderer is done with it
+  for (let now = before; !now || now === before; now = shape()) {
+    if (performance.now() - start > 60000) throw new Error('nothing moved');
+    await frame();
+  }
+  await frame();
+  // reading waits until the renderer is done with it
   const gl = m.canvas.getContext('webgl2');
   gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
   return performance.now() - start;
@@ -187,9 +192,16 @@ def replayed(messages: list[Any]) -> Iterator[Any]:
             yield type(message)(source=script)
 
 
+def shows_box(message: Any) -> bool:
+    """Check that a message draws the box anew: its points alone, or the node of its surface."""
+    if getattr(message, "name", "") == SURFACE:
+        return "glb_data" in getattr(message, "updates", {})
+    return "warpspaceMesh.bend(" in getattr(message, "source", "")
+
+
 def as_sent(messages: list[tuple[float, Any]]) -> list[tuple[float, list[Any]]]:
     """Return the picture of a move, and later messages with their delay, s."""
-    picture = next(at for at, m in messages if "warpspaceMesh.bend(" in getattr(m, "source", ""))
+    picture = next(at for at, message in messages if shows_box(message))
     batches = [(0.0, [m for at, m in messages if at <= picture + TOGETHER_S])]
     for at, message in messages:
         if at > picture + TOGETHER_S:

@@ -89,13 +89,10 @@ class ErrorBasis:
 
     def evaluate(self, amplitudes: Array, *, orientation: bool = True) -> ErrorField:
         """Sum the responses to amplitudes, [K]; the orientation error doubles the time."""
-        return ErrorField(
-            self.nominal_mm,
-            self._combine(amplitudes, self.position),
-            self._combine(amplitudes, self.orientation)
-            if orientation
-            else np.broadcast_to(np.nan, self.nominal_mm.shape),
-        )
+        tilt = np.broadcast_to(np.nan, self.nominal_mm.shape)
+        if orientation:
+            tilt = self._combine(amplitudes, self.orientation)
+        return ErrorField(self.nominal_mm, self._combine(amplitudes, self.position), tilt)
 
     def _combine(self, amplitudes: Array, response: Array) -> Array:
         flat = response.reshape(len(self.keys), self.nominal_mm.size)
@@ -151,9 +148,8 @@ def fit_placement(
     normal = np.linalg.pinv(columns.reshape(-1, 6).T @ weighted, rcond=MIN_EFFECT, hermitian=True)
 
     def fit(errors: Array) -> Array:
-        return (errors.reshape(-1, len(weighted)) @ weighted @ normal).reshape(
-            *error_um.shape[:-4], 6
-        )
+        fitted = errors.reshape(-1, len(weighted)) @ weighted @ normal
+        return fitted.reshape(*error_um.shape[:-4], 6)
 
     placement = fit(error_um)
     for _ in range(EXACT_STEPS if turn else 0):
@@ -187,10 +183,8 @@ def placement_effect(
         beyond = beyond - transforms.skew(angle)
         arm_mm = transforms.apply(transforms.inverse(pose), point_mm)
         shift = shift + transforms.rotate(pose[..., :3, :3] @ beyond, arm_mm) * UM_PER_MM
-    return (
-        shift,
-        np.tensordot(placement[..., 3:], np.broadcast_to(tilt, columns[..., 3:].shape), (-1, -1)),
-    )
+    tilted = np.broadcast_to(tilt, columns[..., 3:].shape)
+    return shift, np.tensordot(placement[..., 3:], tilted, (-1, -1))
 
 
 def _columns(pose: Array, point_mm: Array) -> Array:

@@ -190,15 +190,11 @@ def place_words(picture: LivePicture) -> str:
         name = trace_label(picture, line)
         angle = f"{line.trace.axis} {number(at_deg, 0)}°"
         return f"at {angle} of {name} · {', '.join(points)}"
-    norm_um = picture.field.norm_um
-    node = np.unravel_index(int(norm_um.argmax()), picture.shape)
-    if not norm_um[node]:
+    if not picture.field.norm_um.any():
         return ""
+    node = np.unravel_index(int(np.argmax(picture.field.norm_um)), picture.shape)
     positions = picture.grid.coordinates.items()
-    at = {
-        name: float(np.broadcast_to(values, picture.shape)[node] if values.ndim else values)
-        for name, values in positions
-    }
+    at = {name: float(np.broadcast_to(values, picture.shape)[node]) for name, values in positions}
     axes = formatting.point_axes(picture.drawn_state.scene, at)
     return f"at {formatting.list_axes(axes)}" if axes else ""
 

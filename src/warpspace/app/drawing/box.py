@@ -44,8 +44,7 @@ ISOLINES: tuple[Rgb, Rgb] = ((226, 230, 236), (60, 68, 80))
 def ghost_dashes(picture: LivePicture) -> Array:
     nominal = picture.grid.nominal_mm.reshape(-1, 3)
     edges = [(nominal[edge[0]], nominal[edge[-1]]) for edge in box_edges(picture.grid.shape)]
-    longest = picture.size_mm
-    return dashes(np.array(edges).reshape(-1, 2, 3), DASH * longest, GAP * longest)
+    return dashes(np.array(edges).reshape(-1, 2, 3), DASH * picture.size_mm, GAP * picture.size_mm)
 
 
 def surface(picture: LivePicture) -> SceneNode:
@@ -53,8 +52,7 @@ def surface(picture: LivePicture) -> SceneNode:
     # grid lines would hide a part
     build = partial(map_mesh.line_mesh, grid=without_part) if has_lines else map_mesh.map_mesh
     mesh = build(picture)
-    drawn = mesh.vertices_mm, mesh.triangles, mesh.values
-    return coloured_shape(*drawn, picture.scale, mesh.faded)
+    return coloured_shape(mesh.vertices_mm, mesh.triangles, mesh.values, picture.scale, mesh.faded)
 
 
 def coloured_shape(
@@ -82,11 +80,9 @@ def box(picture: LivePicture) -> Shapes:
         return {}
     shapes: dict[str, SceneNode | None] = {SURFACE: surface(picture)}
     if look.surface != "grid":
-        edges = map_mesh.edge_pieces(picture)
-        shapes["/box/edges"] = lines(edges, colour(picture, "edge"), 1.8)
+        shapes["/box/edges"] = lines(map_mesh.edge_pieces(picture), colour(picture, "edge"), 1.8)
         if options.grid_lines:
-            grid = map_mesh.grid_pieces(picture)
-            shapes["/box/grid"] = lines(grid, colour(picture, "grid"), 0.7)
+            shapes["/box/grid"] = lines(map_mesh.grid_pieces(picture), colour(picture, "grid"), 0.7)
         if look.isolines or look.pass_fail:
             rgb = ISOLINES[picture.scale.diverging]
             shapes["/box/isolines"] = lines(map_mesh.isoline_pieces(picture), rgb, 1.4)

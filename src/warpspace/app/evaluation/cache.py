@@ -19,10 +19,9 @@ class Cache(Generic[T]):
 
     def get(self, key: Hashable, build: Callable[[], T], size: Callable[[T], int]) -> T:
         with self._lock:
-            cached = self._items.get(key)
-            if cached is not None:
+            if key in self._items:
                 self._items.move_to_end(key)
-                return cached[0]
+                return self._items[key][0]
         value = build()
         with self._lock:
             value, _ = self._items.setdefault(key, (value, size(value)))  # another may be first

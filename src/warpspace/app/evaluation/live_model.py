@@ -38,6 +38,7 @@ Start: TypeAlias = Mapping[str, float] | None
 """Errors as a drag began: residual errors are exact there, and of first order from there."""
 CACHE: Cache[Any] = Cache(400_000_000)
 """Responses of the boxes of all tabs."""
+_key_of = lru_cache(maxsize=64)(lambda *_inputs: object())  # a table is hashed once a scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +56,9 @@ class LiveModel:
     def evaluate(self, state: AppState, drawn: DrawnScale | None = None) -> LivePicture:
         if not state.comparison.b:
             return self._single(state, drawn)
-        if drawn is None:
-            return compare_pictures(self._single, state)
-        drawn_state = replace(state, exaggeration=drawn.exaggeration)
-        picture = compare_pictures(partial(self._single, drawn=drawn), drawn_state)
-        if drawn.colours is None:
+        shown = state if drawn is None else replace(state, exaggeration=drawn.exaggeration)
+        picture = compare_pictures(partial(self._single, drawn=drawn), shown)
+        if drawn is None or drawn.colours is None:
             return replace(picture, state=state)
         slices = tuple(replace(piece, colours=drawn.colours) for piece in picture.slices)
         return replace(picture, state=state, colours=drawn.colours, slices=slices)
@@ -78,9 +77,8 @@ class LiveModel:
             largest = max((float(of.max(initial=0.0)) for of in lengths_um), default=0.0)
             factor = auto_exaggeration(largest, model.picture_size_mm(state.scene, grid))
         uncertainty, quantity = self._uncertainty(state, grid, field), state.look.quantity
-        if state.shows_rotary:
-            quantity = "position"
-        if quantity == "uncertainty" and not (uncertainty and uncertainty.errors.is_known):
+        is_unknown = not (uncertainty and uncertainty.errors.is_known)
+        if state.shows_rotary or (quantity == "uncertainty" and is_unknown):
             quantity = "position"
         common: dict[str, Any] = {
             "view": state.view(),
@@ -90,23 +88,16 @@ class LiveModel:
             "significant": state.look.significant,
         }
         if (state.component, quantity) == ("norm", "position") and not state.shows_rotary:
-            if state.look.pass_fail:
-                common["limit_um"] = state.specification.limit_um
-            else:
-                common["hatch_um"] = state.specification.limit_um
+            effect = "limit_um" if state.look.pass_fail else "hatch_um"
+            common[effect] = state.specification.limit_um
         traced = tuple(
             TraceLines(group, own.nominal_mm, error, factor)
             for (group, own), error in zip(traces, errors, strict=True)
         )
         picture = LivePicture(
-            **common,
-            grid=grid,
-            field=field,
-            uncertainty=uncertainty,
+            **common, grid=grid, field=field, uncertainty=uncertainty, state=state, traces=traced,
             cut=state.look.surface == "cut",
-            state=state,
-            traces=traced,
-        )
+        )  # fmt: skip
         colours = drawn and drawn.colours
         common["colours"] = colours or _chosen_colours(state, picture, basis)
         slices = tuple(self._slices(state, common, start))
@@ -120,8 +111,8 @@ class LiveModel:
             return None
 
         def build() -> FieldUncertainty | None:
-            at, point_mm = grid.coordinates, grid.point_mm
-            return field_uncertainty(scene, field.error_um, at, state.view(), point_mm)
+            view = state.view()
+            return field_uncertainty(scene, field.error_um, grid.coordinates, view, grid.point_mm)
 
         key = "uncertainty", Identity(grid), Identity(scene), _place(state)
         uncertainty = CACHE.get(key, build, lambda built: 3 * built.response.nbytes)
@@ -193,16 +184,11 @@ def _place(state: AppState) -> tuple[object, ...]:
 def _response_inputs(of: Identity) -> object:
     """Return the inputs of responses that come from a scene, but for its amplitudes, as one key."""
     scene: Scene = of.target
-    unit = {key: curve.with_amplitude(1.0) for key, curve in scene.errors.functions.items()}
-    shapes = tuple((key, at) for key, at in unit.items() if not isinstance(at, Constant))
-    ranges, reference = scene.workspace.ranges.items(), (scene.reference or {}).items()
-    volume = tuple(ranges), tuple(reference), scene.trace_points_mm
+    unit = [(key, curve.with_amplitude(1.0)) for key, curve in scene.errors.functions.items()]
+    shapes = tuple((key, curve) for key, curve in unit if not isinstance(curve, Constant))
+    reference = scene.reference if scene.reference is None else tuple(scene.reference.items())
+    volume = tuple(scene.workspace.ranges.items()), reference, scene.trace_points_mm
     return _key_of(Identity(scene.model), scene.parameter_keys, shapes, *volume)
-
-
-@lru_cache(maxsize=64)
-def _key_of(*_inputs: object) -> object:
-    return object()  # compared by identity: a table would be hashed with every picture
 
 
 def _size(response: Response) -> int:
@@ -242,17 +228,14 @@ def _chosen_colours(state: AppState, volume: LivePicture, basis: ErrorBasis) -> 
     """Return the selected colour scale: fixed, shared, or with round ends."""
     quantity, component, look = volume.quantity, state.component, state.look
     field, values = volume.field, volume.shown_values
-    if state.shows_rotary:
-        end = look.range_top if look.range_mode == "fixed" else None
-        return model.choose_scale([values], component, end=end)
     limit = volume.limit_um
     if limit is not None:
         scale = model.choose_scale([values], component)
         top = max(scale.high, limit)
         return PassFail(0.0, top, diverging=True, label=scale.label, unit=scale.unit, limit=limit)
-    if look.range_mode == "shared" and quantity != "uncertainty":
+    if look.range_mode == "shared" and quantity != "uncertainty" and not state.shows_rotary:
         opened = basis.evaluate(np.array([state.start[key] for key in basis.keys]))
-        errors = (model.coloured_error(error_field, quantity) for error_field in (field, opened))
+        errors = [model.coloured_error(at, quantity) for at in (field, opened)]
         lengths = [np.linalg.norm(error, axis=-1) for error in errors]
         return model.choose_scale(lengths, component, quantity)
     end = look.range_top if look.range_mode == "fixed" else None

@@ -30,7 +30,6 @@ from warpspace.app.state.app_state import COMPARISON_VIEWS, COMPONENT_NAMES, NOB
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import DRAWINGS, QUANTITIES, SURFACES, slice_positions
 from warpspace.app.state.tree import leaves, put
-from warpspace.field.grid import Grid
 from warpspace.geometry.surfaces import corners
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection, is_linear, parameter
@@ -142,7 +141,13 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
     isolines = look.isolines and look.surface != "grid"
     return {
         "axes": _labels_json(Identity(axis_labels(picture))),
-        **_grid_facts(Identity(grid)),
+        "triad": [
+            {"name": name if name and is_linear(name) else "xyz"[k],
+             "way": [float(k == i) * sign for i in range(3)]}
+            for k, (name, sign) in enumerate(zip(grid.axes, grid.directions.tolist(), strict=True))
+        ],
+        "perMm": SCENE_PER_MM,
+        "centre": _scene(grid.bounds_mm.mean(axis=0)),
         "bars": look.bars,
         "solid": look.surface in ("surface", "cut"),
         "factor": picture.exaggeration,
@@ -159,20 +164,6 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
              "low": _scene(low), "high": _scene(high)}
             for low, high in [piece.grid.bounds_mm for piece in picture.slices]
         ],
-    }  # fmt: skip
-
-
-@lru_cache(maxsize=32)
-def _grid_facts(of: Identity) -> dict[str, Any]:
-    grid: Grid = of.target
-    return {
-        "triad": [
-            {"name": name if name and is_linear(name) else "xyz"[k],
-             "way": [float(k == i) * sign for i in range(3)]}
-            for k, (name, sign) in enumerate(zip(grid.axes, grid.directions.tolist(), strict=True))
-        ],
-        "perMm": SCENE_PER_MM,
-        "centre": _scene(grid.bounds_mm.mean(axis=0)),
     }  # fmt: skip
 
 
