@@ -132,12 +132,10 @@ def _is_closed(faces: NDArray[np.int64]) -> bool:
     """Check that each edge occurs equally often in both directions."""
     count = faces.max(initial=0) + 1
     random = np.random.default_rng(0)
-    begin_weight, end_weight = random.integers(2**64, size=(2, count), dtype=np.uint64)
+    weights = random.integers(2**64, size=(2, count), dtype=np.uint64)
+    begin, end = ([weight[corner] for corner in faces.T] for weight in weights)
     # a random number per direction; only opposite ones cancel
-    sums = [
-        int(np.sum(begin_weight[begin] * end_weight[end] - end_weight[begin] * begin_weight[end]))
-        for begin, end in zip(faces.T, np.roll(faces, 1, axis=1).T, strict=True)
-    ]
+    sums = [int(np.sum(begin[at] * end[at - 1] - end[at] * begin[at - 1])) for at in range(3)]
     return sum(sums) % 2**64 == 0
 
 
