@@ -120,7 +120,6 @@ def _merge_stl(data: bytes) -> Any:
     faces = pa.array(key).dictionary_encode().indices.to_numpy()  # in the order of the file
     vertices = np.empty((faces.max(initial=-1) + 1, 3), np.float32)
     vertices[faces] = corner
-    del key
     if not np.array_equal(vertices[faces], corner):
         return None
     return trimesh.Scene(trimesh.Trimesh(vertices, faces.reshape(-1, 3), process=False))

@@ -130,9 +130,8 @@ def read_mesh(
 
 def _is_closed(faces: NDArray[np.int64]) -> bool:
     """Check that each edge occurs equally often in both directions."""
-    count = faces.max(initial=0) + 1
     random = np.random.default_rng(0)
-    weights = random.integers(2**64, size=(2, count), dtype=np.uint64)
+    weights = random.integers(2**64, size=(2, faces.max(initial=0) + 1), dtype=np.uint64)
     begin, end = ([weight[corner] for corner in faces.T] for weight in weights)
     # a random number per direction; only opposite ones cancel
     sums = [int(np.sum(begin[at] * end[at - 1] - end[at] * begin[at - 1])) for at in range(3)]

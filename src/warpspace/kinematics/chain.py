@@ -98,8 +98,8 @@ def carry_inwards(model: Model, side: str, coordinates: Coordinates, point_mm: T
 def carry_outwards(model: Model, side: str, coordinates: Coordinates, point_mm: Triple) -> Triple:
     """Transform a point from R to the frame after the last axis of a branch, components, mm."""
     for axis in model.machine.branch(side):
-        inverse_step = transforms.inverse(_nominal_step(axis, coordinates))
-        point_mm = components.move(inverse_step, point_mm)
+        step = transforms.inverse(_nominal_step(axis, coordinates))
+        point_mm = components.move(step, point_mm)
     return point_mm
 
 
@@ -180,29 +180,22 @@ def _build_link(
 ) -> Link:
     place = transforms.placed(axis.offset_mm, axis.rotation_deg)
     nominal = _nominal_step(axis, coordinates)
-    rotation, position_mm = components.split_rows(nominal[..., :3, :3]), nominal[..., :3, 3]
-    link = Link(
-        rotation, components.split(position_mm), rotation, components.ZERO, components.ZERO_ROWS
-    )
+    actual = rotation = components.split_rows(nominal[..., :3, :3])
+    shift_um, turn_urad = components.ZERO, components.ZERO_ROWS
     if not exact:
         shift_um, (x, y, z) = _small_motion(model, AxisFrames(axis, place, nominal), values)
-        minus_x, minus_y, minus_z = components.scale(-1.0, (x, y, z))
-        turn_urad = (0.0, minus_z, y), (z, 0.0, minus_x), (minus_y, x, 0.0)
-        return link._replace(shift_um=shift_um, turn_urad=turn_urad)
-    if any(parameter(key).axis == axis.name for key in values):
-        move = motion(axis, coordinates[axis.name])
+        turn_urad = (0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)
+    elif any(parameter(key).axis == axis.name for key in values):
+        move, pose = motion(axis, coordinates[axis.name]), place
         constant = error_transform(axis.name, values, constant=True)
         component = error_transform(axis.name, values, constant=False)
-        actual = place
         for factor in model.convention(axis.name).factors(constant, move, component):
-            actual = actual if factor is None else actual @ factor
-        deviation = actual @ transforms.inverse(place @ move) - np.eye(4)
-        return link._replace(
-            actual=components.split_rows(actual[..., :3, :3]),
-            shift_um=components.split(deviation[..., :3, 3] * UM_PER_MM),
-            turn_urad=components.split_rows(deviation[..., :3, :3] * URAD_PER_RAD),
-        )
-    return link
+            pose = pose if factor is None else pose @ factor
+        deviation = pose @ transforms.inverse(place @ move) - np.eye(4)
+        actual = components.split_rows(pose[..., :3, :3])
+        shift_um = components.split(deviation[..., :3, 3] * UM_PER_MM)
+        turn_urad = components.split_rows(deviation[..., :3, :3] * URAD_PER_RAD)
+    return Link(rotation, components.split(nominal[..., :3, 3]), actual, shift_um, turn_urad)
 
 
 def _small_motion(

@@ -106,7 +106,5 @@ def simplify(values: Array) -> Number:
     """Return a component, a constant one as a float."""
     if not values.size:
         return values
-    first = values.flat[0]
-    # the last one tells most arrays apart without a comparison of all
-    is_constant = first == values.flat[-1] and (values == first).all()
-    return float(first) if is_constant else values
+    first = values.flat[0]  # most arrays differ at their ends
+    return float(first) if first == values.flat[-1] and (values == first).all() else values
