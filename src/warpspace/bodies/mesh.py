@@ -92,9 +92,8 @@ def _check_count(count: int, limit: int, what: str) -> None:
 
 
 def _count_stl(data: bytes, max_triangles: int) -> None:
-    stated = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little")
     if _is_binary(data):
-        _check_count(stated, max_triangles, "triangles")
+        _check_count((len(data) - _STL_HEAD) // _STL_ROW.itemsize, max_triangles, "triangles")
         return
     _count_text(data, max_triangles)
     text = data.lower()

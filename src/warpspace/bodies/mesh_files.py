@@ -82,7 +82,8 @@ def read_mesh(
     is_closed = len(mesh.vertices) <= len(mesh.faces) and _is_closed(mesh.faces)
     if not is_closed:
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    mesh.update_faces((mesh.faces != np.roll(mesh.faces, 1, axis=1)).all(axis=1))
+    corner = mesh.faces.T
+    mesh.update_faces(np.all([corner[at] != corner[at - 1] for at in range(3)], axis=0))
     if not len(mesh.faces):
         raise OptionError(f"{path}: there are no triangles in it")
     mesh.apply_scale(mm_per_unit)
