@@ -30,6 +30,7 @@ BENCHMARKS = (
     "bench_montecarlo",
     "bench_acceptance",
     "bench_parts",
+    "bench_measured",
     "bench_program",
     "bench_start",
     "bench_outputs",

@@ -92,9 +92,8 @@ def _check_count(count: int, limit: int, what: str) -> None:
 
 
 def _count_stl(data: bytes, max_triangles: int) -> None:
-    stated = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little")
     if _is_binary(data):
-        _check_count(stated, max_triangles, "triangles")
+        _check_count((len(data) - _STL_HEAD) // _STL_ROW.itemsize, max_triangles, "triangles")
         return
     _count_text(data, max_triangles)
     text = data.lower()
@@ -109,6 +108,7 @@ def _is_binary(data: bytes) -> bool:
 
 def _merge_stl(data: bytes) -> Any:
     """Read a binary STL with equal corners merged; None for a collision of keys."""
+    import pyarrow as pa
     import trimesh
 
     rows = np.frombuffer(data, _STL_ROW, offset=_STL_HEAD)
@@ -116,13 +116,9 @@ def _merge_stl(data: bytes) -> Any:
     key = np.zeros(len(corner), np.uint64)
     for column, mixer in zip(corner.view(np.uint32).T, _MIXERS, strict=True):
         key ^= column * np.uint64(mixer)
-    order = np.argsort(key)
-    key = key[order]
-    is_new = np.append(True, key[1:] != key[:-1])[: len(key)]
-    first, place = np.unique(order[is_new], return_inverse=True)  # neighbours stay close in memory
-    vertices, faces = corner[first], np.empty(len(corner), np.int32)
-    faces[order] = place.astype(np.int32)[np.cumsum(is_new, dtype=np.int32) - 1]
-    del key, order, is_new
+    faces = pa.array(key).dictionary_encode().indices.to_numpy()  # in the order of the file
+    vertices = np.empty((faces.max(initial=-1) + 1, 3), np.float32)
+    vertices[faces] = corner
     if not np.array_equal(vertices[faces], corner):
         return None
     return trimesh.Scene(trimesh.Trimesh(vertices, faces.reshape(-1, 3), process=False))

@@ -82,7 +82,8 @@ def read_mesh(
     is_closed = len(mesh.vertices) <= len(mesh.faces) and _is_closed(mesh.faces)
     if not is_closed:
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    mesh.update_faces((mesh.faces != np.roll(mesh.faces, 1, axis=1)).all(axis=1))
+    corner = mesh.faces.T
+    mesh.update_faces(np.all([corner[at] != corner[at - 1] for at in range(3)], axis=0))
     if not len(mesh.faces):
         raise OptionError(f"{path}: there are no triangles in it")
     mesh.apply_scale(mm_per_unit)
@@ -130,14 +131,11 @@ def read_mesh(
 
 def _is_closed(faces: NDArray[np.int64]) -> bool:
     """Check that each edge occurs equally often in both directions."""
-    count = faces.max(initial=0) + 1
     random = np.random.default_rng(0)
-    begin_weight, end_weight = random.integers(2**64, size=(2, count), dtype=np.uint64)
+    weights = random.integers(2**64, size=(2, faces.max(initial=0) + 1), dtype=np.uint64)
+    begin, end = ([weight[corner] for corner in faces.T] for weight in weights)
     # a random number per direction; only opposite ones cancel
-    sums = [
-        int(np.sum(begin_weight[begin] * end_weight[end] - end_weight[begin] * begin_weight[end]))
-        for begin, end in zip(faces.T, np.roll(faces, 1, axis=1).T, strict=True)
-    ]
+    sums = [int(np.sum(begin[at] * end[at - 1] - end[at] * begin[at - 1])) for at in range(3)]
     return sum(sums) % 2**64 == 0
 
 

@@ -98,14 +98,21 @@ def carry_inwards(model: Model, side: str, coordinates: Coordinates, point_mm: T
 def carry_outwards(model: Model, side: str, coordinates: Coordinates, point_mm: Triple) -> Triple:
     """Transform a point from R to the frame after the last axis of a branch, components, mm."""
     for axis in model.machine.branch(side):
-        inverse_step = transforms.inverse(_nominal_step(axis, coordinates))
-        point_mm = components.move(inverse_step, point_mm)
+        step = transforms.inverse(_nominal_step(axis, coordinates))
+        point_mm = components.move(step, point_mm)
     return point_mm
 
 
 def _nominal_step(axis: Axis, coordinates: Coordinates) -> Array:
     place = transforms.placed(axis.offset_mm, axis.rotation_deg)
-    return place @ motion(axis, coordinates[axis.name])
+    if not axis.is_linear:
+        return place @ motion(axis, coordinates[axis.name])
+    signed = axis.direction * np.asarray(coordinates[axis.name], dtype=float)
+    # each component is contiguous; a product of matrices of each position takes ten times longer
+    step = np.moveaxis(np.empty((4, 4, *signed.shape)), (0, 1), (-2, -1))
+    step[...] = place
+    step[..., :3, 3] += signed[..., None] * place[:3, axis.index]
+    return step
 
 
 # Both branches are walked from their outer ends to the frame of the machine. A branch moves from
@@ -172,46 +179,44 @@ def _build_link(
     model: Model, axis: Axis, coordinates: Coordinates, values: ErrorValues, *, exact: bool
 ) -> Link:
     place = transforms.placed(axis.offset_mm, axis.rotation_deg)
-    move = motion(axis, coordinates[axis.name])
-    actual = nominal = place @ move
-    shift_um, turn_urad = np.zeros(3), np.zeros((3, 3))
+    nominal = _nominal_step(axis, coordinates)
+    actual = rotation = components.split_rows(nominal[..., :3, :3])
+    shift_um, turn_urad = components.ZERO, components.ZERO_ROWS
     if not exact:
-        shift_um, rotation = _small_motion(model, AxisFrames(axis, place, nominal), values)
-        turn_urad = transforms.skew(rotation)
+        shift_um, (x, y, z) = _small_motion(model, AxisFrames(axis, place, nominal), values)
+        turn_urad = (0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)
     elif any(parameter(key).axis == axis.name for key in values):
+        move, pose = motion(axis, coordinates[axis.name]), place
         constant = error_transform(axis.name, values, constant=True)
         component = error_transform(axis.name, values, constant=False)
-        actual = place
         for factor in model.convention(axis.name).factors(constant, move, component):
-            actual = actual if factor is None else actual @ factor
-        deviation = actual @ transforms.inverse(nominal) - np.eye(4)
-        shift_um = deviation[..., :3, 3] * UM_PER_MM
-        turn_urad = deviation[..., :3, :3] * URAD_PER_RAD
-    return Link(
-        components.split_rows(nominal[..., :3, :3]),
-        components.split(nominal[..., :3, 3]),
-        components.split_rows(actual[..., :3, :3]),
-        components.split(shift_um),
-        components.split_rows(turn_urad),
-    )
+            pose = pose if factor is None else pose @ factor
+        deviation = pose @ transforms.inverse(place @ move) - np.eye(4)
+        actual = components.split_rows(pose[..., :3, :3])
+        shift_um = components.split(deviation[..., :3, 3] * UM_PER_MM)
+        turn_urad = components.split_rows(deviation[..., :3, :3] * URAD_PER_RAD)
+    return Link(rotation, components.split(nominal[..., :3, 3]), actual, shift_um, turn_urad)
 
 
 def _small_motion(
     model: Model, frames: AxisFrames, values: Mapping[str, Array | float]
-) -> tuple[Array, Array]:
+) -> tuple[Triple, Triple]:
     """Sum the errors of an axis to first order: displacement of the origin, and rotation vector."""
     convention = model.convention(frames.axis.name)
-    shift_um, turn_urad = np.zeros(3), np.zeros(3)
+    shift_um = turn_urad = components.ZERO
     for key, value in values.items():
         row = parameter(key)
         if row.axis != frames.axis.name or not np.any(value):
             continue
         pose = convention.frame(frames, row)
-        along = pose[..., :3, row.direction] * np.asarray(value)[..., None]
+        along = components.scale(
+            components.simplify(np.asarray(value)), components.split(pose[..., :3, row.direction])
+        )
         if row.is_rotation:
-            turn_urad = turn_urad + along
-            along = np.cross(pose[..., :3, 3], along) * UM_PER_MM_URAD
-        shift_um = shift_um + along
+            turn_urad = components.add(turn_urad, along)
+            lever = components.cross(components.split(pose[..., :3, 3]), along)
+            along = components.scale(UM_PER_MM_URAD, lever)
+        shift_um = components.add(shift_um, along)
     return shift_um, turn_urad
 
 
@@ -439,8 +444,8 @@ def body_motions(
         pose, turn, shift = np.eye(4), np.zeros(3), np.zeros(3)
         for frames in branch_frames(model, side, coordinates):
             shift_um, turn_urad = _small_motion(model, frames, values)
-            pose, turn = frames.after, turn + turn_urad * RAD_PER_URAD
-            shift = shift + shift_um * MM_PER_UM
+            pose, turn = frames.after, turn + np.array(turn_urad) * RAD_PER_URAD
+            shift = shift + np.array(shift_um) * MM_PER_UM
             motions[frames.axis.name] = BodyMotion(pose, turn, shift)
         for name, offset, rotation in model.machine.end_frames(side):
             pose = pose @ transforms.placed(offset, rotation)

@@ -26,7 +26,7 @@ def triple(values: Iterable[T]) -> tuple[T, T, T]:
 
 def split(vectors: Array) -> Triple:
     """Split vectors, [..., 3], into components; a constant one becomes a float."""
-    return triple(_plain(vectors[..., index]) for index in range(3))
+    return triple(simplify(vectors[..., index]) for index in range(3))
 
 
 def split_rows(matrices: Array) -> Rows:
@@ -102,8 +102,9 @@ def transpose(rows: Rows) -> Rows:
     return (a, d, g), (b, e, h), (c, f, i)
 
 
-def _plain(values: Array) -> Number:
+def simplify(values: Array) -> Number:
+    """Return a component, a constant one as a float."""
     if not values.size:
         return values
-    first = values.flat[0]
-    return float(first) if (values == first).all() else values
+    first = values.flat[0]  # most arrays differ at their ends
+    return float(first) if first == values.flat[-1] and (values == first).all() else values

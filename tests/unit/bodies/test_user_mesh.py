@@ -17,7 +17,7 @@ import PIL.Image
 import pytest
 import trimesh
 
-from warpspace.bodies.mesh import open_meshes
+from warpspace.bodies.mesh import _merge_stl, open_meshes
 from warpspace.bodies.mesh_files import FORMATS, check_meshes, frame_meshes, load_mesh, read_mesh
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
 from warpspace.scene.library import load_scene
@@ -673,3 +673,14 @@ def test_a_missing_package_is_named_with_its_extra(monkeypatch):
     monkeypatch.setattr(trimesh, "load_scene", load)
     with pytest.raises(OptionError, match=r"needs cascadio: pip install 'warpspace\[step\]'"):
         read_mesh(Path("a.step"), None, data=step_box(30, 20, 10, ".MILLI."))
+
+
+def test_vertices_of_an_stl_are_in_the_order_of_the_file():
+    """On every processor: a sort that is not stable would choose among equal corners."""
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    scene = _merge_stl(ball.export(file_type="stl"))
+    (merged,) = scene.geometry.values()
+    corner, place = np.unique(merged.faces, return_index=True)
+    assert len(merged.vertices) == len(ball.vertices)
+    assert (np.diff(place) > 0).all()
+    assert (corner == np.arange(len(corner))).all()
