@@ -32,6 +32,8 @@ from warpspace.resources import __version__
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
+_figures: WeakSet[Figure] = WeakSet()
+
 
 def figure_bytes(drawing: Drawing, form: str) -> bytes:
     facts = drawing.facts
@@ -44,9 +46,6 @@ def figure_bytes(drawing: Drawing, form: str) -> bytes:
         "pdf": {"Creator": facts["version"], "Subject": about, "Keywords": keywords},
     }[form]
     return encode_figure(drawing.figure, form, {"Title": drawing.title, **tags})
-
-
-_figures: WeakSet[Figure] = WeakSet()
 
 
 def render_figure(
@@ -100,9 +99,7 @@ def encode_figure(figure: Figure, form: str, facts: Mapping[str, str] | None = N
             canvas.draw()
             # the paper is opaque: without the transparency files are a quarter smaller
             pixels = np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3])
-            Image.fromarray(pixels).save(
-                buffer, format="png", pnginfo=text, dpi=(figure.dpi, figure.dpi)
-            )
+            Image.fromarray(pixels).save(buffer, "png", pnginfo=text, dpi=(figure.dpi, figure.dpi))
         else:
             figure.savefig(
                 buffer, format=form, dpi="figure", metadata={**_UNDATED[form], **(facts or {})},

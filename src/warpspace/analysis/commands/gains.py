@@ -63,8 +63,7 @@ def lever_parts(model: Model, loop: Loop, key: str, at: Mapping[str, float]) -> 
         stops.append((name, last[:3, 3]))
     point = model.tool_point_mm if side == "tool" else model.workpiece_point_mm
     stops.append(("point", transforms.apply(last, point)))
-    pairs = pairwise(stops)
-    vectors = [(name, vector(end - start)) for (_, start), (name, end) in pairs]
+    vectors = [(name, vector(end - start)) for (_, start), (name, end) in pairwise(stops)]
     return tuple((name, vector) for name, vector in vectors if any(vector))
 
 
@@ -176,20 +175,18 @@ def _larger(
     coordinates: Mapping[str, Array],
     best: Gain | None = None,
 ) -> Gain:
+    shape = np.broadcast_shapes(*(values.shape for values in coordinates.values()))
     sizes = np.abs(np.moveaxis(col.position, -1, 0))
-    norms = np.sqrt(sum(sizes * sizes))
+    norms = np.broadcast_to(np.sqrt(sum(sizes * sizes)), shape)
     top = sizes.max(axis=tuple(range(1, sizes.ndim)))
     # Rounded, so that of positions that are equal but for rounding errors the first is taken.
-    index = np.unravel_index(int(np.argmax(np.round(norms, 9))), norms.shape)
+    index = np.unravel_index(int(np.argmax(np.round(norms, 9))), shape)
     norm = float(norms[index])
     if best is not None:
         top = np.maximum(top, (best.x, best.y, best.z))
     x, y, z = vector(top)
     if best is not None and norm <= best.norm + 1e-9:
         return replace(best, x=x, y=y, z=z)
-    # Axes on which the gain does not depend are at their first position.
-    shape = np.broadcast_shapes(*(values.shape for values in coordinates.values()))
-    index = (0,) * (len(shape) - norms.ndim) + index
     at = {
         name: float(np.broadcast_to(values, shape)[index]) for name, values in coordinates.items()
     }
@@ -221,14 +218,12 @@ def _sweep(
     outer, inner = rotary[:1], rotary[1:]
     mesh = dict(zip(inner, np.meshgrid(*(turns[name] for name in inner)), strict=True))
     rows = max(1, NODES_AT_ONCE // math.prod(len(turns[name]) for name in inner))
-    for ends in product(*(dict.fromkeys(ranges[name]) for name in linear)):
-        fixed = {name: np.asarray(end) for name, end in zip(linear, ends, strict=True)}
-        for start in range(0, len(turns[outer[0]]) if outer else 1, rows):
-            first = {
-                name: turns[name][start : start + rows].reshape(-1, *(1 for _ in inner))
-                for name in outer
-            }
-            yield complete_coordinates(model.machine, {**mesh, **fixed, **first})
+    columns = [turns[name].reshape(-1, *(1 for _ in inner)) for name in outer]
+    blocks = [np.array_split(column, range(rows, len(column), rows)) for column in columns]
+    for values in product(*(dict.fromkeys(ranges[name]) for name in linear), *blocks):
+        pairs = zip((*linear, *outer), values, strict=True)
+        positions = {**mesh, **{name: np.asarray(value) for name, value in pairs}}
+        yield complete_coordinates(model.machine, positions)
 
 
 def _default_step(ranges: Mapping[str, tuple[float, float]], rotary: Sequence[str]) -> float:

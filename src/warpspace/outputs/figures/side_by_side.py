@@ -195,13 +195,8 @@ def picture_concept(concept: Concept, nodes: int) -> ScenePicture:
     grid = build_grid(scene.model, scene.workspace, nodes)
     expected, zero = expected_um(concept, grid), np.zeros(grid.nominal_mm.shape)
     along_x = np.stack([expected, zero[..., 0], zero[..., 0]], axis=-1)
-    return ScenePicture(
-        view=concept.sampled.case.view,
-        grid=grid,
-        field=ErrorField(grid.nominal_mm, along_x, zero),
-        exaggeration=0.0,
-        scene=scene,
-    )
+    view, field = concept.sampled.case.view, ErrorField(grid.nominal_mm, along_x, zero)
+    return ScenePicture(view=view, grid=grid, field=field, exaggeration=0.0, scene=scene)
 
 
 def _draw_machines(
