@@ -169,6 +169,6 @@ class Planner:
 def is_placement(scene: Scene, grid: Grid, response: Array) -> NDArray[np.bool_]:
     """Find the responses, [K], that are those of a placement of the workpiece."""
     fitted = fit_placement(scene.model, grid, response)
-    rest = response - placement_effect(scene.model, fitted, grid.coordinates, grid.point_mm)[0]
-    largest = [np.abs(part).max(axis=(1, 2, 3, 4), initial=0.0) for part in (rest, response)]
+    remaining = response - placement_effect(scene.model, fitted, grid.coordinates, grid.point_mm)[0]
+    largest = [np.abs(part).max(axis=(1, 2, 3, 4), initial=0.0) for part in (remaining, response)]
     return np.less_equal(largest[0], PLACEMENT_ONLY * largest[1])

@@ -91,8 +91,8 @@ def learn_stiffness(
     matrix, readings, unstated = [np.zeros((0, len(names)))], [np.zeros(0)], list[str]()
     for entry, after in pairwise((*entries, DoneActs({}, scene.errors, None))):
         changed = {key for name in entry.changes for key in effects[name]}
-        for known in (entry.keys, after.keys):
-            changed &= changed if known is None else known
+        for measured_keys in (entry.keys, after.keys):
+            changed &= changed if measured_keys is None else measured_keys
         for key in sorted(changed):
             at = np.zeros(1)
             if not parameter(key).is_constant:

@@ -107,8 +107,6 @@ def parse_table_file(path: Path, limit_bytes: int, parse: Callable[[TextIO], T])
 
 SPREADSHEET = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """First bytes of .xlsx and .ods, and of .xls."""
-DAMAGED = zipfile.BadZipFile, NotImplementedError, UnicodeDecodeError
-"""Errors of zipfile for a damaged archive, or one packed in a way that it does not know."""
 _SAMPLE_BYTES = 4096
 _UTF16_SHARE = 0.3
 """Smallest share of zero bytes at every other position of UTF-16 without a byte order mark."""
@@ -154,7 +152,12 @@ def _sheet_text(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
             raise SceneError(name, [f"is {size:,} bytes long when unpacked; {limit}"])
         workbook = reader.CalamineWorkbook.from_filelike(io.BytesIO(content))
         rows = workbook.get_sheet_by_index(0).to_python(skip_empty_area=False)
-    except (reader.CalamineError, *DAMAGED) as error:
+    except (
+        reader.CalamineError,
+        zipfile.BadZipFile,
+        NotImplementedError,
+        UnicodeDecodeError,
+    ) as error:
         problem = f"is no readable spreadsheet ({one_line(str(error))}); expected {expected}"
         raise SceneError(name, [problem]) from None
     text = io.StringIO()

@@ -56,8 +56,8 @@ class LiveModel:
     def evaluate(self, state: AppState, drawn: DrawnScale | None = None) -> LivePicture:
         if not state.comparison.b:
             return self._single(state, drawn)
-        shown = state if drawn is None else replace(state, exaggeration=drawn.exaggeration)
-        picture = compare_pictures(partial(self._single, drawn=drawn), shown)
+        scaled_state = state if drawn is None else replace(state, exaggeration=drawn.exaggeration)
+        picture = compare_pictures(partial(self._single, drawn=drawn), scaled_state)
         if drawn is None or drawn.colours is None:
             return replace(picture, state=state)
         slices = tuple(replace(piece, colours=drawn.colours) for piece in picture.slices)
