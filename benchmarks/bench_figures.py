@@ -72,7 +72,7 @@ def measure() -> Section:
     ours, bare = picture_costs()
     baseline = "a bare script: PyVista, matplotlib, 21³"
     rows += [
-        Row("draw", ours.processor_s, baseline, bare.processor_s, max_ratio=1.3),
+        Row("draw", ours.processor_s, baseline, bare.processor_s, max_ratio=1.2),
         Row("draw, wall", ours.wall_s, baseline, bare.wall_s),
     ]
     process = psutil.Process()
