@@ -323,7 +323,7 @@ ADJUSTER_WORDS = (
 )
 LOG = (
     b"[[done]]\nacts = { 'front column bolts' = 0.01 }\nbefore = { EC0Y = 30, EA0Z = 33.9 }\n",
-    b"[[done]]\nacts = {}\nbefore = 'dvf5000_first'\n",
+    b"[[done]]\nacts = {}\nbefore = {}\n[[done]]\nacts = {}\nbefore = { EB0Z = 18.1 }\n",
 )
 SYMPTOMS = (
     b"circle of 100 mm oval by 30 \xc2\xb5m at 45\xc2\xb0, same in both directions",
