@@ -25,10 +25,10 @@ from warpspace.outputs.exports.fields import FIELD_ENDINGS, FieldRecord, write_f
 NODES, PEER_NODES = 101, 41
 INF = float("inf")
 EXPORTS = (  # name, arguments, ending; seconds of processor and of the wall, and MB allowed
-    ("export .glb", ("export", "dvf5000_first"), ".glb", 30.0, INF, 8.0),
+    ("export .glb", ("export", "dvf5000_first"), ".glb", 1.5, INF, 8.0),
     ("export .vts", ("export", "dvf5000_first"), ".vts", 30.0, INF, 8.0),
     ("export .html", ("export", "dvf5000_first"), ".html", 30.0, INF, 3.0),
-    ("report .html, one scene", ("report", "dvf5000_first"), ".html", 9.0, 6.0, 8.0),
+    ("report .html, one scene", ("report", "dvf5000_first"), ".html", 5.0, 4.0, 8.0),
     (
         "report .pdf, two scenes",
         ("report", "dvf5000_first", "dvf5000_second"),
