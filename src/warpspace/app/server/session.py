@@ -193,6 +193,7 @@ class Session:
         self._scale: DrawnScale | None = None
         self._drag_start: LivePicture | None = None
         self._in_view: LivePicture | None = None  # the latest that `_keep_in_view` has checked
+        self._rejected: list[str] = []  # controls that still show a value that was not taken
         self._failing = set[object]()  # panels and layers that fail in any state
         self._is_identified = False  # whether the page has sent its token
         self._surroundings_due_at: float | None = None  # at the latest
@@ -409,7 +410,8 @@ class Session:
         before, self._scale, is_rejected = self._scale, self._drawn_scale(state), bool(notes)
         if context.camera.wanted and focus(picture.state) == focus(state):
             context.camera.place(picture)
-        if notes or state is not picture.state or self._scale != before:
+        is_same = not notes and state is picture.state and self._scale == before
+        if not is_same:
             if before is not None and before.colours is not None and self._scale is None:
                 context.page.run_script(f"warpspaceMesh.next = {RESCALE_MS};")
             try:
@@ -424,13 +426,18 @@ class Session:
             else:
                 self._keep_in_view(evaluated)
             self._shown = now
-        elif self.display.scheduler.due_in_s is None:  # otherwise a panel may still show the past
-            is_rejected = True
-        controls = [str(action) for action in actions if hasattr(action, "value")]
-        if controls and is_rejected:
-            context.page.call("settle", controls)
+        if is_rejected or is_same:
+            self._rejected += [str(action) for action in actions if hasattr(action, "value")]
+        if is_rejected or self.display.scheduler.due_in_s is None:  # else a panel may show the past
+            self._reset_rejected()
         if notes:
             context.notify("Please note", "\n".join(notes), "warning")
+
+    def _reset_rejected(self) -> None:
+        """Show the present values of rejected controls."""
+        if self._rejected:
+            self.context.page.call("settle", self._rejected)
+            self._rejected = []
 
     def _drawn_scale(self, state: AppState) -> DrawnScale | None:
         """Return the scales of the drawing; None where they are those of the state."""
@@ -475,6 +482,7 @@ class Session:
             self.display.settle(picture, self._render)
         if self.display.scheduler.due_in_s is None:
             self._settled = self._shown
+            self._reset_rejected()
 
     def _render(self, part: object, step: Callable[[], object]) -> None:
         try:
