@@ -181,7 +181,8 @@ class AcceptanceResult(Result):
     factor: float | None = None  # for all limits, so that |E| ≤ keep_um; None if there is none
 
     def json_fields(self) -> dict[str, Any]:
-        unused = {key for key in ("next", "measurands", "ranges") if not getattr(self, key)}
+        unused = {key for key in ("next", "measurands") if not getattr(self, key)}
+        unused |= {"ranges"} if self.ranges is None else set[str]()
         unused |= {"smallest_set"} if self.limit_um is None else set[str]()
         unused |= {"keep_um", "factor"} if self.keep_um is None else set[str]()
         return {key: value for key, value in super().json_fields().items() if key not in unused}
