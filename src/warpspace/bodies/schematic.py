@@ -28,7 +28,7 @@ def read_bodies(path: Path) -> tuple[Body, ...]:
         return ()
     scene = open_meshes(path, _WHAT, has_materials=True)
     lines = {
-        name.removesuffix(LINES): np.reshape(geometry.vertices, (-1, 2, 3))
+        name.removesuffix(LINES): np.array(geometry.vertices).reshape(-1, 2, 3)
         for name, geometry in scene.geometry.items()
         if name.endswith(LINES)
     }

@@ -113,6 +113,9 @@ def cli() -> None:
 def main() -> None:
     """Run the command line; expected errors are one message on stderr and exit status 2."""
     atexit.register(gc.freeze)  # the end of the process frees what a last collection would
+    # before numpy is loaded: products are short, and threads of OpenBLAS that wait for the next one
+    # take the time of a core from the program, its workers and a browser that renders in software
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     _open_standard_streams()
     _silence_libraries()
     with handle_signals() as ending:

@@ -78,7 +78,7 @@ DEFAULT_STEPS_DEG = (1.0, 5.0, 10.0, 15.0, 30.0, 45.0, 90.0)
 """Of rotary axes: the finest that keeps to `MAX_DEFAULT_NODES` positions; 1° for two axes."""
 MAX_NODES = 5_000_000
 MAX_DEFAULT_NODES = 500_000
-NODES_AT_ONCE = 4_000  # of a sweep: few calls, and arrays that stay in the cache
+NODES_AT_ONCE = 16_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,9 +176,14 @@ def _larger(
     best: Gain | None = None,
 ) -> Gain:
     shape = np.broadcast_shapes(*(values.shape for values in coordinates.values()))
-    sizes = np.abs(np.moveaxis(col.position, -1, 0))
-    norms = np.broadcast_to(np.sqrt(sum(sizes * sizes)), shape)
-    top = sizes.max(axis=tuple(range(1, sizes.ndim)))
+    top = np.abs(col.position)
+    while top.ndim > 1:  # one dimension after the other: long rows, several times faster
+        top = top.max(axis=0)
+    squares = np.einsum("...i,...i", col.position, col.position)
+    is_below = best is not None and not (top > (best.x, best.y, best.z)).any()
+    if best is not None and is_below and np.sqrt(squares.max()) <= best.norm:
+        return best
+    norms = np.broadcast_to(np.sqrt(squares), shape)
     # Rounded, so that of positions that are equal but for rounding errors the first is taken.
     index = np.unravel_index(int(np.argmax(np.round(norms, 9))), shape)
     norm = float(norms[index])

@@ -1,6 +1,5 @@
 """Commands that show errors: app, figures, comparison, export, design review."""
 
-import os
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -99,9 +98,6 @@ def view(
 
     Without SCENE, dvf5000_first is opened.
     """
-    # Before numpy is loaded: a slider move is one short product, and spinning OpenBLAS threads next
-    # to a browser that renders in software make it thirty times slower.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from warpspace.app.server.request_policy import Access
     from warpspace.app.server.viewer import run_viewer
     from warpspace.bodies.mesh_files import check_meshes

@@ -114,6 +114,7 @@ class FigureSettings:
     conditions: tuple[str, ...] = ()
     caption: str = ""  # lines of text below the drawing
     concepts: "Concepts | None" = None  # sampling of machines that are compared side by side
+    prepared: Any = None  # what the figure would compute first: placed bodies, or adjustments
     # for a report, which has heading, footer and statistics itself: the figure omits them and has
     # its printed size
     printed: bool = False

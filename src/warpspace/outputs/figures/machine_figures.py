@@ -54,7 +54,8 @@ def _drawn_body(part: PlacedBody, theme: Theme) -> off_screen.RenderedBody:
 def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     picture = evaluate_for(settings, scenes[0])
     title = f"Machine and working volume: {picture.scene.title}"
-    placed = place_bodies(picture.scene, picture.view, picture.exaggeration)
+    placed = settings.prepared
+    placed = placed or place_bodies(picture.scene, picture.view, picture.exaggeration)
     facts = scene_facts(picture, picture.exaggeration)
     facts.append("bodies schematic, deformed and tilted like their frames")
     legend = [

@@ -28,6 +28,7 @@ from warpspace.analysis.description import ProgressCallback, Result, ignore_prog
 from warpspace.analysis.note_tables import notes_table
 from warpspace.analysis.sampling.distribution import choose_distribution
 from warpspace.analysis.uncertainty.propagation import u95_lines
+from warpspace.bodies.placed import PlacedBody, place_bodies
 from warpspace.exceptions import NoRendererError, OptionError, RenderError, WarpspaceError
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import MAX_CSV_BYTES, MOST_CONCEPTS
@@ -55,6 +56,7 @@ from warpspace.outputs.report.templating import (
     render_html,
     render_pdf,
     report_time,
+    shorten_figure,
 )
 from warpspace.picture.comparison import statistics_blocks
 from warpspace.picture.formatting import (
@@ -120,10 +122,16 @@ class ReportFigures:
                 for kind in figure_kinds()
                 if kind.evidence and kind.name not in left_out
             ]
-            self.evidence.append([self.begin(name, [scene], caption) for name, caption in figures])
+            self.evidence.append(
+                [
+                    self.begin(name, [scene], caption, prepared=_prepared(name, picture))
+                    for name, caption in figures
+                ]
+            )
 
     def chart(self, chart: Chart) -> Block:
-        data = self._worker.begin_chart("chart", CHART, self._form, chart)()
+        drawn = self._worker.begin_chart("chart", CHART, self._form, chart)()
+        data = shorten_figure(drawn, self._form)
         width = LINES_WIDTH if isinstance(chart, Lines) else 1.0
         named = isinstance(chart, Histogram)
         caption = f"Distribution: {chart.x_label}." if named else chart.title
@@ -135,6 +143,7 @@ class ReportFigures:
         scenes: Sequence[Scene],
         caption: str,
         settings: FigureSettings | None = None,
+        prepared: Any = None,
     ) -> Drawn:
         """Begin a figure; if drawing fails twice, the figure is missing."""
         # the lean of the tool axis needs a factor of its own to be visible
@@ -142,7 +151,7 @@ class ReportFigures:
         loop, grid = self._settings.loop, self._settings.grid
         settings = settings or FigureSettings(exaggeration=factor, loop=loop, grid=grid)
         size = PRINTED_PX, HIGH_PX if name in HIGH else HEIGHT_PX
-        settings = replace(settings, size=size, printed=True)
+        settings = replace(settings, size=size, printed=True, prepared=prepared)
         begin = partial(self._worker.begin, name, scenes, settings, self._form)
         begun = begin()
         self._begun += 1
@@ -152,7 +161,8 @@ class ReportFigures:
             self._done += 1
             for first_or_second in (lambda: begun, begin):
                 try:
-                    return ReportFigure(name, caption, first_or_second()(), self._form)
+                    data = shorten_figure(first_or_second()(), self._form)
+                    return ReportFigure(name, caption, data, self._form)
                 except NoRendererError:
                     raise
                 except RenderError as error:
@@ -163,6 +173,16 @@ class ReportFigures:
             return Text(f"{caption} This figure is missing: {failed}.", "note")
 
         return drawn
+
+
+def _prepared(name: str, picture: ScenePicture) -> tuple[PlacedBody, ...] | None:
+    """Place the bodies here, where the page needs their file, too."""
+    try:
+        if name == "machine":
+            return place_bodies(picture.scene, picture.view, picture.exaggeration)
+    except WarpspaceError:
+        pass  # drawing gives the reason
+    return None
 
 
 ENDINGS = (".html", ".pdf")
@@ -340,7 +360,8 @@ def result_blocks(review: Review, figures: ReportFigures, *names: str) -> Iterat
             yield from report_blocks(blocks)
             if result.worthwhile:
                 caption = f"Before, after set {result.worthwhile[0] + 1}, and their difference."
-                yield figures.begin("adjust", [reviewed.scene], reviewed.titled(caption))()
+                titled, scene = reviewed.titled(caption), reviewed.scene
+                yield figures.begin("adjust", [scene], titled, prepared=result)()
 
 
 def map_blocks(review: Review, figures: ReportFigures, embed: Embed | None) -> Iterator[Block]:

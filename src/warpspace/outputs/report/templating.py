@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import matplotlib as mpl
-import typst
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
@@ -136,9 +134,16 @@ def _table_markup(table: Table) -> Markup:
     return Markup(table_html(table))  # noqa: S704 - escaped there
 
 
+def shorten_figure(data: bytes, form: str) -> bytes:
+    """Shorten an SVG file: single blanks, and paths with two decimals."""
+    if form != "svg":
+        return data
+    text = re.sub(r"\s+", " ", data.decode())
+    return _PATH.sub(lambda path: _NUMBER.sub(_rounded, path.group()), text).encode()
+
+
 def _data_uri(picture: ReportFigure) -> str:
-    text = re.sub(r"\s+", " ", picture.data.decode())
-    text = _PATH.sub(lambda path: _NUMBER.sub(_rounded, path.group()), text)
+    text = picture.data.decode()
     if "'" not in text:
         text = text.replace('"', "'")  # need no escape in the page
     return "data:image/svg+xml," + _UNSAFE.sub(lambda found: quote(found.group()), text)
@@ -154,6 +159,9 @@ def _attribute_page(page: str) -> Markup:
 
 
 def render_pdf(report: Report) -> bytes:
+    import typst
+    from matplotlib import get_data_path
+
     try:
         with temporary_folder() as folder:
             template = files("warpspace.outputs.report") / "templates" / TEMPLATE
@@ -175,7 +183,7 @@ def render_pdf(report: Report) -> bytes:
             return typst.compile(
                 str(folder / TEMPLATE),
                 root=str(folder),
-                font_paths=[str(Path(mpl.get_data_path()) / "fonts" / "ttf")],
+                font_paths=[str(Path(get_data_path()) / "fonts" / "ttf")],
                 ignore_system_fonts=True,
                 timestamp=int(report_time().timestamp()),
             )
