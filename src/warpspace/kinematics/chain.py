@@ -91,7 +91,15 @@ def tool_axis(model: Model, coordinates: Coordinates) -> Array:
 def carry_inwards(model: Model, side: str, coordinates: Coordinates, point_mm: Triple) -> Triple:
     """Transform a point from the frame after the last axis of a branch to R, components, mm."""
     for axis in reversed(model.machine.branch(side)):
-        point_mm = components.move(_nominal_step(axis, coordinates), point_mm)
+        if not axis.is_linear:
+            point_mm = components.move(_nominal_step(axis, coordinates), point_mm)
+            continue
+        place = transforms.placed(axis.offset_mm, axis.rotation_deg)
+        signed = axis.direction * np.asarray(coordinates[axis.name], dtype=float)
+        along = components.scale(components.simplify(signed), components.split(place[:3, axis.index]))
+        position = components.add(components.split(place[:3, 3]), along)
+        turned = components.rotate(components.split_rows(place[:3, :3]), point_mm)
+        point_mm = components.add(turned, position)
     return point_mm
 
 

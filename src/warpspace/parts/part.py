@@ -212,6 +212,9 @@ class Part(WorkpieceAnalysis):
         )
 
 
+SMALLEST_NORMAL = 1e-13  # mm², twice the area of a triangle that has no normal
+
+
 def _deviations(
     part: Workpiece,
     shares: Array,
@@ -219,21 +222,31 @@ def _deviations(
     states: Sequence[tuple[Array, FieldUncertainty | None]],
 ) -> list[PartDeviation]:
     """Summarise errors and their components along the normals of triangles."""
-    from trimesh import triangles
-
+    x, y, z = np.ascontiguousarray(part.vertices_mm.T)
+    components = [np.ascontiguousarray(error_um.T) for error_um, _ in states]
     # lowest and highest so far: deviation, vertex, normal
     spans = [[(end, 0, np.zeros(3)) for end in (np.inf, -np.inf)] for _ in states]
     for first in range(0, len(part.triangles), TRIANGLES_AT_ONCE):
-        rows = part.triangles[first : first + TRIANGLES_AT_ONCE]
-        normals, is_valid = triangles.normals(np.take(part.vertices_mm, rows, axis=0))
-        corners = rows[is_valid]
-        for (error_um, _), span in zip(states, spans, strict=True):
-            along = np.einsum("tcx,tx->tc", np.take(error_um, corners, axis=0), normals)
-            if not along.size:
-                continue
-            for index, (choose, better) in enumerate(((np.argmin, min), (np.argmax, max))):
-                at = int(choose(along))
-                candidate = along.item(at), corners.item(at), normals[at // 3]
+        rows = part.triangles[first : first + TRIANGLES_AT_ONCE].T.astype(np.intp, order="C")
+        (a, b, c), (u, v, w) = (
+            [np.take(of, rows[at]) - np.take(of, rows[0]) for of in (x, y, z)] for at in (1, 2)
+        )
+        normals = np.stack([b * w - c * v, c * u - a * w, a * v - b * u])
+        lengths = np.sqrt(np.einsum("xt,xt->t", normals, normals))
+        is_valid = lengths > SMALLEST_NORMAL
+        if not is_valid.all():
+            rows, normals, lengths = rows[:, is_valid], normals[:, is_valid], lengths[is_valid]
+        if not lengths.size:
+            continue
+        normals /= lengths
+        for errors, span in zip(components, spans, strict=True):
+            pairs = zip(errors, normals, strict=True)
+            along = sum(np.take(of, rows) * normal for of, normal in pairs)
+            for index, better in enumerate((min, max)):
+                ends = along.min(axis=0) if better is min else along.max(axis=0)
+                at = int(ends.argmin() if better is min else ends.argmax())
+                corner = int((along[:, at] == ends[at]).argmax())
+                candidate = along.item(corner, at), rows.item(corner, at), normals[:, at].copy()
                 span[index] = better(span[index], candidate, key=itemgetter(0))
     deviations = zip(states, spans, strict=True)
     return [_summarise(actual, shares, *state, span) for state, span in deviations]
