@@ -130,7 +130,8 @@ def measure() -> Section:
             )
         for label, arguments, ending, seconds, wall, size in EXPORTS:
             path = folder / f"{label.split(',')[0].replace(' ', '_')}{ending}"
-            cost = python("-m", "warpspace", *arguments, "-o", path)
+            command = ("-m", "warpspace", *arguments, "--force", "-o", path)
+            cost = cheapest(lambda: python(*command), 2)  # noqa: B023  # the first one compiles
             large = path.stat().st_size / 1e6
             baseline = "python, numpy"
             rows += [
