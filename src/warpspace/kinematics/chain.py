@@ -96,7 +96,9 @@ def carry_inwards(model: Model, side: str, coordinates: Coordinates, point_mm: T
             continue
         place = transforms.placed(axis.offset_mm, axis.rotation_deg)
         signed = axis.direction * np.asarray(coordinates[axis.name], dtype=float)
-        along = components.scale(components.simplify(signed), components.split(place[:3, axis.index]))
+        along = components.scale(
+            components.simplify(signed), components.split(place[:3, axis.index])
+        )
         position = components.add(components.split(place[:3, 3]), along)
         turned = components.rotate(components.split_rows(place[:3, :3]), point_mm)
         point_mm = components.add(turned, position)

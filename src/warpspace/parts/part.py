@@ -223,7 +223,6 @@ def _deviations(
 ) -> list[PartDeviation]:
     """Summarise errors and their components along the normals of triangles."""
     x, y, z = np.ascontiguousarray(part.vertices_mm.T)
-    components = [np.ascontiguousarray(error_um.T) for error_um, _ in states]
     # lowest and highest so far: deviation, vertex, normal
     spans = [[(end, 0, np.zeros(3)) for end in (np.inf, -np.inf)] for _ in states]
     for first in range(0, len(part.triangles), TRIANGLES_AT_ONCE):
@@ -239,9 +238,9 @@ def _deviations(
         if not lengths.size:
             continue
         normals /= lengths
-        for errors, span in zip(components, spans, strict=True):
-            pairs = zip(errors, normals, strict=True)
-            along = sum(np.take(of, rows) * normal for of, normal in pairs)
+        for (error_um, _), span in zip(states, spans, strict=True):
+            errors = (np.take(error_um, corner, axis=0) for corner in rows)
+            along = np.stack([np.einsum("tx,xt->t", error, normals) for error in errors])
             for index, better in enumerate((min, max)):
                 ends = along.min(axis=0) if better is min else along.max(axis=0)
                 at = int(ends.argmin() if better is min else ends.argmax())
