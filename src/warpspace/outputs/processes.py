@@ -171,6 +171,7 @@ def _interrupts_held_back() -> Generator[None]:
 
 def _work(pipe: "Connection[Any, Any]") -> None:
     _follow_parent()
+    gc.set_threshold(50_000, 5, 5)  # as for a command, see `main`
     while True:
         try:
             task = pipe.recv()

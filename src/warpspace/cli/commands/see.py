@@ -1,5 +1,6 @@
 """Commands that show errors: app, figures, comparison, export, design review."""
 
+import gc
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -109,6 +110,7 @@ def view(
     opened_scene = load_scene(scene)
     check_meshes(opened_scene.machine)
     bundled = {name: opened_scene if name == scene else load_scene(name) for name in scene_names()}
+    gc.set_threshold(1_000, 10, 10)  # a server runs for long: close to Python's own
     run_viewer(
         opened_scene,
         {loaded.title: loaded for loaded in bundled.values()},
