@@ -56,7 +56,6 @@ from warpspace.outputs.report.templating import (
     render_html,
     render_pdf,
     report_time,
-    shorten_figure,
 )
 from warpspace.picture.comparison import statistics_blocks
 from warpspace.picture.formatting import (
@@ -130,8 +129,7 @@ class ReportFigures:
             )
 
     def chart(self, chart: Chart) -> Block:
-        drawn = self._worker.begin_chart("chart", CHART, self._form, chart)()
-        data = shorten_figure(drawn, self._form)
+        data = self._worker.begin_chart("chart", CHART, self._form, chart)()
         width = LINES_WIDTH if isinstance(chart, Lines) else 1.0
         named = isinstance(chart, Histogram)
         caption = f"Distribution: {chart.x_label}." if named else chart.title
@@ -161,8 +159,7 @@ class ReportFigures:
             self._done += 1
             for first_or_second in (lambda: begun, begin):
                 try:
-                    data = shorten_figure(first_or_second()(), self._form)
-                    return ReportFigure(name, caption, data, self._form)
+                    return ReportFigure(name, caption, first_or_second()(), self._form)
                 except NoRendererError:
                     raise
                 except RenderError as error:

@@ -134,16 +134,9 @@ def _table_markup(table: Table) -> Markup:
     return Markup(table_html(table))  # noqa: S704 - escaped there
 
 
-def shorten_figure(data: bytes, form: str) -> bytes:
-    """Shorten an SVG file: single blanks, and paths with two decimals."""
-    if form != "svg":
-        return data
-    text = re.sub(r"\s+", " ", data.decode())
-    return _PATH.sub(lambda path: _NUMBER.sub(_rounded, path.group()), text).encode()
-
-
 def _data_uri(picture: ReportFigure) -> str:
-    text = picture.data.decode()
+    text = re.sub(r"\s+", " ", picture.data.decode())
+    text = _PATH.sub(lambda path: _NUMBER.sub(_rounded, path.group()), text)
     if "'" not in text:
         text = text.replace('"', "'")  # need no escape in the page
     return "data:image/svg+xml," + _UNSAFE.sub(lambda found: quote(found.group()), text)
