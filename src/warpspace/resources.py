@@ -6,6 +6,7 @@ from warpspace.exceptions import WarpspaceError
 
 __version__ = "0.1.0"
 RENDERER_MB = 1600  # address space of the renderer for a picture
+GARBAGE_THRESHOLDS = 50_000, 5, 5  # of a command or drawing: loading modules leaves no garbage
 _PACKAGE_DIR = Path(__file__).resolve().parent
 
 

@@ -26,7 +26,7 @@ from warpspace.cli.analyses import command_of
 from warpspace.cli.file_arguments import Commands
 from warpspace.cli.tables import echo, plain
 from warpspace.exceptions import WarpspaceError, shorten
-from warpspace.resources import __version__
+from warpspace.resources import GARBAGE_THRESHOLDS, __version__
 
 if TYPE_CHECKING:
     from warpspace.analysis.description import Task
@@ -112,7 +112,7 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line; expected errors are one message on stderr and exit status 2."""
-    gc.set_threshold(50_000, 5, 5)  # loading modules leaves no garbage to look for
+    gc.set_threshold(*GARBAGE_THRESHOLDS)
     atexit.register(gc.freeze)  # the end of the process frees what a last collection would
     # before numpy is loaded: products are short, and threads of OpenBLAS that wait for the next one
     # take the time of a core from the program, its workers and a browser that renders in software

@@ -21,7 +21,7 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 from warpspace import exceptions
-from warpspace.resources import RENDERER_MB, check_address_space
+from warpspace.resources import GARBAGE_THRESHOLDS, RENDERER_MB, check_address_space
 
 if TYPE_CHECKING:
     from warpspace.outputs.drawing.settings import FigureSettings
@@ -171,7 +171,7 @@ def _interrupts_held_back() -> Generator[None]:
 
 def _work(pipe: "Connection[Any, Any]") -> None:
     _follow_parent()
-    gc.set_threshold(50_000, 5, 5)  # as for a command, see `main`
+    gc.set_threshold(*GARBAGE_THRESHOLDS)
     while True:
         try:
             task = pipe.recv()

@@ -78,7 +78,7 @@ DEFAULT_STEPS_DEG = (1.0, 5.0, 10.0, 15.0, 30.0, 45.0, 90.0)
 """Of rotary axes: the finest that keeps to `MAX_DEFAULT_NODES` positions; 1° for two axes."""
 MAX_NODES = 5_000_000
 MAX_DEFAULT_NODES = 500_000
-NODES_AT_ONCE = 16_000
+NODES_AT_ONCE = 16_000  # of a sweep: few calls, and arrays that stay in the cache
 
 
 @dataclass(frozen=True, slots=True)

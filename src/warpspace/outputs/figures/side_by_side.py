@@ -129,8 +129,7 @@ def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
 def draw_adjustment(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     scene = scenes[0]
     grid = min(settings.grid, REPAIR_NODES[1])
-    adjust = Adjust(loop=settings.chosen_loop, grid=grid)
-    adjustment = settings.prepared or adjust.run(scene)
+    adjustment = settings.prepared or Adjust(loop=settings.chosen_loop, grid=grid).run(scene)
     after, remark = scene, "no adjustment required"
     if adjustment.worthwhile:
         proposed = adjustment.worthwhile[0]
