@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Try what is handed out: builds wheel and sdist twice, then puts the wheel into empty environments,
 # for every Python that pyproject.toml names in its classifiers, with the newest packages and with the
-# lowest that it allows (where these have a wheel for that Python), and runs .ci/smoke.py in each. A
-# Python that this machine does not have is named as not tried.
+# lowest that it allows (where these have a wheel for that Python), and runs .ci/smoke.py in each. The
+# newest are installed with pip, as users do, with megabytes and seconds; then the sdist in place of
+# the wheel. A Python that this machine does not have is named as not tried.
 # A small typed program is checked against the installed wheel, the citation file against its schema.
 # Takes some minutes a Python. PYTHONS="python3.12 /opt/python3.14/bin/python" names others.
 set -u
@@ -42,19 +43,38 @@ find_pythons() {
     done
 }
 
-# fill ENVIRONMENT PYTHON RESOLUTION: the packages of the wheel, resolved and installed
-fill() {
-    local requirements=$1.txt wheels=()
-    [ "$3" = highest ] || wheels=(--only-binary :all:)
-    "$uv" pip compile --quiet --python "$2" --resolution "$3" ${wheels[@]+"${wheels[@]}"} \
-        --extra urdf pyproject.toml -o "$requirements" &&
+# fill_lowest ENVIRONMENT PYTHON: the lowest packages that the wheel allows, resolved and installed
+fill_lowest() {
+    "$uv" pip compile --quiet --python "$2" --resolution lowest-direct --only-binary :all: \
+        --extra urdf pyproject.toml -o "$1.txt" &&
         "$uv" venv --quiet --python "$2" "$1" &&
-        "$uv" pip install --quiet --python "$1/bin/python" -r "$requirements" &&
+        "$uv" pip install --quiet --python "$1/bin/python" -r "$1.txt" &&
         "$uv" pip install --quiet --python "$1/bin/python" --no-deps "$wheel"
+}
+
+# fill_newest ENVIRONMENT PYTHON: pip install, in two steps, so that the network is not in the seconds
+fill_newest() {
+    local pip=("$1/bin/python" -m pip --quiet --disable-pip-version-check --no-cache-dir) before began
+    "$uv" venv --quiet --seed --python "$2" "$1" && before=$(megabytes "$1") &&
+        "${pip[@]}" download -d "$1-files" "$wheel" && began=$(date +%s%N) &&
+        "${pip[@]}" install --no-index --find-links "$1-files" "$wheel" || return 1
+    installed="$(megabytes "$1-files") MB of downloads, installed in $((($(date +%s%N) - began) / 1000000000)) s"
+    installed+=" to $(($(megabytes "$1") - before)) MB"
+    "${pip[@]}" install "$wheel[urdf]"
+}
+
+megabytes() { # megabytes FOLDER
+    du -s --block-size=1000000 --apparent-size "$1" | cut -f1
+}
+
+smoke() { # smoke ENVIRONMENT
+    rm -rf "$work/run" && mkdir "$work/run" &&
+        (cd "$work/run" && "$1/bin/python" "$root/.ci/smoke.py" "$version")
 }
 
 bash .ci/dist.sh "$python" "$work/dist" || { echo "FAILED  wheel and sdist" >&2; exit 1; }
 wheel=$(echo "$work"/dist/*.whl)
+sdist=$(echo "$work"/dist/*.tar.gz)
 version=$(basename "$wheel" | cut -d- -f2)
 summary+=("works   wheel and sdist of $version, two builds alike")
 
@@ -72,13 +92,18 @@ read -r -a pythons <<<"${PYTHONS:-$(find_pythons | tr '\n' ' ')}"
 for interpreter in "${pythons[@]}"; do
     name=$("$interpreter" -c 'import platform; print(platform.python_version())')
     tried+="$(echo "$name" | cut -d. -f2) "
-    for resolution in highest lowest-direct; do
+    for resolution in newest lowest; do
         environment=$work/$name-$resolution
-        mkdir -p "$work/run"
-        fill "$environment" "$interpreter" "$resolution" >"$log" 2>&1 &&
-            (cd "$work/run" && "$environment/bin/python" "$root/.ci/smoke.py" "$version") >>"$log" 2>&1
+        installed=""
+        "fill_$resolution" "$environment" "$interpreter" >"$log" 2>&1 && smoke "$environment" >>"$log" 2>&1
         note $? "Python $name, $resolution packages: $(tail -n 1 "$log" | cut -d: -f2-)"
-        if [ "$resolution" = highest ] && [ ! -e "$work/typed" ]; then
+        if [ "$resolution" = newest ]; then
+            summary+=("        $installed; $(tail -n 2 "$log" | head -n 1)")
+            "$environment/bin/python" -m pip install --quiet --force-reinstall --no-deps "$sdist" >"$log" 2>&1 &&
+                smoke "$environment" >>"$log" 2>&1
+            note $? "Python $name, sdist: $(tail -n 2 "$log" | head -n 1)"
+        fi
+        if [ "$resolution" = newest ] && [ ! -e "$work/typed" ]; then
             touch "$work/typed"
             cp tests/typed/program.py "$work/run/program.py"
             (cd "$work/run" && printf '{"typeCheckingMode": "strict", "include": ["program.py"]}' \
@@ -89,7 +114,7 @@ for interpreter in "${pythons[@]}"; do
                 --python-executable "$environment/bin/python" program.py) >"$log" 2>&1
             note $? "typed program against the wheel, mypy strict"
         fi
-        rm -rf "$environment" "$work/run"
+        rm -rf "$environment"* "$work/run"
     done
 done
 
