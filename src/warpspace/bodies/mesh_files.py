@@ -82,7 +82,7 @@ def read_mesh(
     is_closed = len(mesh.vertices) <= len(mesh.faces) and _is_closed(mesh.faces)
     if not is_closed:
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    corner = mesh.faces.T
+    corner = mesh.faces.reshape(-1, 3).T
     mesh.update_faces(np.all([corner[at] != corner[at - 1] for at in range(3)], axis=0))
     if not len(mesh.faces):
         raise OptionError(f"{path}: there are no triangles in it")

@@ -88,6 +88,7 @@ def corrupted(tmp_path_factory):
     written(folder / "points.ply", points)
     written(folder / "points.glb", points.scene())
     (folder / "points.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n")
+    (folder / "edge.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n")
     (folder / "point.obj").write_text("v -10.0\n", "utf-8")
     (folder / "flat.obj").write_text("v 0 0 0\nv 100 0 0\nv 200 0 0\nf 1 2 3\n")
     for value in (np.nan, np.inf, 2.0**40):
@@ -108,6 +109,7 @@ def corrupted(tmp_path_factory):
         ("points.ply", "there are no triangles", {}),
         ("points.glb", "there are no triangles", {}),
         ("points.obj", "there are no triangles", {}),
+        ("edge.obj", "there are no triangles", {}),
         ("point.obj", ".*without three coordinates", {}),
         ("flat.obj", "all of its triangles", {}),
         ("nan.stl", "a vertex is not finite", {}),
