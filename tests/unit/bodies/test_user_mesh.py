@@ -95,6 +95,11 @@ def corrupted(tmp_path_factory):
         data = bytearray(written(folder / "a.stl", box()).read_bytes())
         struct.pack_into("<f", data, 84 + 12, value)
         (folder / f"{value}.stl").write_bytes(data)
+    turned = trimesh.Scene()
+    turned.add_geometry(box(), transform=trimesh.transformations.rotation_matrix(1.0, (1, 2, 3)))
+    content = turned.export(file_type="glb")
+    largest = struct.pack("<f", box().vertices.max())
+    (folder / "inf.glb").write_bytes(content.replace(largest, struct.pack("<f", np.inf)))
     content = trimesh.creation.box((20.0, 30.0, 40.0)).export(file_type="ply", encoding="ascii")
     head, faces = content.split(b"end_header\n")
     far = re.sub(rb"(?m)^3 7 ", b"3 70 ", faces)
@@ -114,6 +119,7 @@ def corrupted(tmp_path_factory):
         ("flat.obj", "all of its triangles", {}),
         ("nan.stl", "a vertex is not finite", {}),
         ("inf.stl", "a vertex is not finite", {}),
+        ("inf.glb", "a vertex is not finite", {}),
         ("1099511627776.0.stl", "a vertex is at 1.1e.12; expected at most 1e.09", {}),
         ("box.ply", "no PLY file .* refers to a missing vertex", {}),
         ("a.iges", r"unknown ending; expected one of \.stl", {}),
