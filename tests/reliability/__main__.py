@@ -25,7 +25,8 @@ def main() -> int:
         began = time.monotonic()
         outcome = ROWS[name].run(max(1, round(ROWS[name].full * options.fraction)))
         failed |= bool(outcome.faults)
-        print(f"{name}: {outcome.count:,}, {time.monotonic() - began:.0f} s; {outcome.result}")
+        seconds = time.monotonic() - began
+        print(f"{name}: {outcome.count:,}, {seconds:.0f} s; {outcome.result}", flush=True)
         for fault in outcome.faults:
             print(f"  fault: {fault}", flush=True)
         if not options.dry and outcome.count:

@@ -509,7 +509,7 @@ def correct_program(analysis: Program, program: ParsedProgram) -> Iterator[str]:
 
 
 def _header(scene: Scene, analysis: Program, dialect: str) -> Iterator[str]:
-    digest = sha256(scene_to_toml(scene).encode()).hexdigest()[:12]
+    digest = sha256(scene_to_toml(scene).encode(errors="replace")).hexdigest()[:12]
     title = f"{scene.title[:80]}, chain {scene.machine.chain}, errors {digest}"
     setup = [f"{name}={value:g}" for name, value in analysis.offset]
     setup += [f"dialect {dialect}"] * bool(dialect)

@@ -288,6 +288,7 @@ def test_offsets_are_bounded_as_lengths_are(dvf: Scene, offset: str):
         ),
         ("G1 X0." + "1" * 400, "X0.1+…; .* in up to 40 characters"),
         ("G1 X1 AB" + "9" * 400, "AB9+…; expected a"),
+        ("O" + "9" * 400, "O9{37,39}…; expected at most ±99999999"),
         ("G1 X1 F100000000", "F100000000; expected at most ±99999999"),
         ("G1 X1\u2028G0 Z-300", r"'\\u2028G0'; expected a letter and a number"),
         ("G2 I5 P1001", "P1001; expected at most 1,000 turns"),

@@ -56,7 +56,7 @@ WORD = re.compile(
 )
 _SKIP = re.compile(r"(N\s*+\d++\s*+)?+(/[/\d]*+\s*+)(.*+)", re.IGNORECASE)
 _HEADER = re.compile(  # lines before the first block
-    r"%.*+|\$[^%\s]++%|O?<[^<>]++>\s*+(\([^()]*+\)\s*+)*+|[O:]\s*+\d++\s*+(\([^()]*+\)\s*+)*+",
+    r"%.*+|\$[^%\s]++%|O?<[^<>]++>\s*+(\([^()]*+\)\s*+)*+|[O:]\s*+\d{1,8}+\s*+(\([^()]*+\)\s*+)*+",
     re.IGNORECASE,
 )
 _CORNER = re.compile(rf"(,[RC])\s*+({NUMBER})")
