@@ -116,6 +116,24 @@ def test_the_worst_line_of_a_parser_takes_time_in_proportion_to_its_length(each,
     assert found <= lines.STEEPEST
 
 
+@pytest.mark.parametrize(
+    ("name", "head", "piece"),
+    [
+        ("import isg-csv", b"%% x.csv\n", b"A "),
+        ("import csv", b"%% x.csv\n", b"X,"),
+        ("readings", b"", b"x_mm,"),
+    ],
+)
+def test_equal_columns_are_refused_in_proportion_to_their_number(name, head, piece, tmp_path):
+    (each,) = (one for one in EVERY if one.name == name)
+
+    def make(length):
+        return head + piece * (length // len(piece)) + b"x\n1\n"
+
+    found = lines.growth(lambda content: each.read(content, tmp_path), make, 4_000, 16_000)
+    assert found <= lines.STEEPEST
+
+
 @pytest.mark.nightly
 def test_many_blank_lines_are_passed_over_in_proportion_to_their_number(tmp_path):
     for each in EVERY:

@@ -17,6 +17,7 @@ from warpspace.resources import assets_dir
 from warpspace.scene.model import Scene, coverage_notes
 from warpspace.scene.text_files import (
     CsvRows,
+    list_repeated,
     match_column,
     plain_heading,
     radian_notes,
@@ -94,7 +95,7 @@ def parse_reading_table(text: str, source: str) -> ReadingTable:
     header = [plain_heading(name).lower() for name in rows.header]
     if not header:
         raise SceneError(source, ["is empty; expected a header and rows of readings"])
-    repeated = {name for name in header if header.count(name) > 1}
+    repeated = list_repeated(header)
     if repeated:
         raise SceneError(source, [f"names column {min(repeated)!r} twice; expected each once"])
     problems: dict[str, list[str]] = {}

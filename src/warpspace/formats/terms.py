@@ -17,6 +17,7 @@ from warpspace.kinematics.model import Coordinates
 from warpspace.kinematics.relative_motion import angle_error, reading_errors
 from warpspace.machine.axes import is_linear, sort_axes
 from warpspace.machine.definition import Machine, build_machine
+from warpspace.scene.text_files import list_repeated
 from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
 
 
@@ -303,10 +304,9 @@ def _merged(
     for surface in surfaces:
         place = (surface.key, surface.axes)
         merged[place] = _added(merged[place], surface) if place in merged else surface
-    keys = [key for key, _ in merged]
-    repeated = next((key for key in keys if keys.count(key) > 1), "")
+    repeated = list_repeated(key for key, _ in merged)
     if repeated:
-        source.refuse(f"has products of {repeated} with two other axes", "one per error")
+        source.refuse(f"has products of {repeated[0]} with two other axes", "one per error")
     single_axis: list[measured.ErrorSeries] = []
     for error in series:
         place = next((place for place in merged if place[0] == error.key), None)

@@ -8,6 +8,7 @@ import re
 import sys
 import time as clock
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from datetime import date, time
@@ -262,6 +263,11 @@ _ENTRIES = 8
 _HUGE_BITS = 512
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
+
+
+def list_repeated(names: Iterable[T]) -> list[T]:
+    """List what occurs more than once, in order."""
+    return [name for name, count in Counter(names).items() if count > 1]
 
 
 def one_line(text: str) -> str:

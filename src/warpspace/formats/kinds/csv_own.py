@@ -23,7 +23,7 @@ from warpspace.formats.source import (
 from warpspace.machine.axes import PARAMETERS, is_axis_name, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
 from warpspace.scene import text_files
-from warpspace.scene.text_files import ANGLE_URAD, LENGTH_UM, CsvRows, unguard_cell
+from warpspace.scene.text_files import ANGLE_URAD, LENGTH_UM, CsvRows, list_repeated, unguard_cell
 from warpspace.units import Array
 
 RUN, DIRECTION = "run", "direction"
@@ -201,9 +201,9 @@ def _columns(at: SourceLine, rows: CsvRows, options: ReadOptions) -> tuple[_CsvC
         options = replace(options, axis=axes[0])
     columns = [_column(at, heading, options) for heading in headings]
     keys = [(column.role, column.name) for column in columns if column.role != IGNORED]
-    repeated = next((name for role, name in keys if keys.count((role, name)) > 1), None)
+    repeated = list_repeated(keys)
     if repeated:
-        at.refuse(f"column {repeated} occurs twice", "it once")
+        at.refuse(f"column {repeated[0][1]} occurs twice", "it once")
     return tuple(columns)
 
 

@@ -31,6 +31,7 @@ from warpspace.machine.axes import (
     parameter,
 )
 from warpspace.machine.limits import MAX_POINTS
+from warpspace.scene.text_files import list_repeated
 from warpspace.units import UM_PER_MM, URAD_PER_RAD
 
 STANDARD, ALTERNATIVE = "standard", "alternative"
@@ -250,12 +251,13 @@ def _read_block(source: Source, block: Block) -> measured.ImportedErrors:
 def _check_header(
     at: SourceLine, names: Sequence[str], arguments: Sequence[str], ignored: Sequence[str]
 ) -> None:
+    known = {*arguments, *ignored}
     for name in names:
-        if name not in (*arguments, *ignored) and not error_name(name):
+        if name not in known and not error_name(name):
             at.refuse(f"column {name!r}", "arguments X Y Z A B C and parameters such as EXX or C0B")
-    repeated = next((name for name in names if names.count(name) > 1), "")
+    repeated = list_repeated(names)
     if repeated:
-        at.refuse(f"column {repeated} occurs twice", "it once")
+        at.refuse(f"column {repeated[0]} occurs twice", "it once")
     if len(arguments) > 2:
         expected = "one or two: no error parameter depends on more"
         at.refuse(f"{len(arguments)} arguments {' '.join(arguments)}", expected)
