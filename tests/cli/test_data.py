@@ -3,7 +3,9 @@
 import csv
 import itertools
 import re
+import struct
 
+import numpy as np
 import pytest
 import trimesh
 
@@ -257,6 +259,21 @@ def test_meshes_stay_within_the_folder_of_the_robot_or_that_of_the_option(warpsp
         result = warpspace("import", robot, "-o", tmp_path / "last.toml", "--force")
         assert "leads out of" in " ".join(result.out.split())
         assert not (tmp_path / "last_Z.stl").exists()
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf])
+def test_a_mesh_of_a_robot_with_a_vertex_that_is_not_finite_is_left_out(
+    warpspace, tmp_path, number
+):
+    box = bytearray(trimesh.creation.box(extents=(20.0, 30.0, 40.0)).export(file_type="stl"))
+    struct.pack_into("<f", box, 84 + 12, number)
+    (tmp_path / "a.stl").write_bytes(box)
+    robot = tmp_path / "mill.urdf"
+    robot.write_text(ROBOT.replace("package://mill/", "").format(mesh="a.stl"), encoding="utf-8")
+    result = warpspace("import", robot, "-o", tmp_path / "made.toml")
+    assert "not finite; left out" in " ".join(result.out.split())
+    assert (result.status, result.err) == (0, "")
+    assert not (tmp_path / "made_Z.stl").exists()
 
 
 @pytest.mark.parametrize(("name", "flag"), [("allocate", "--limit"), ("convert", "--to")])

@@ -165,13 +165,15 @@ def _read_import(name: str | None, content: bytes, _: Path) -> object:
     """Read files as their format whatever their first lines say, or as what they look like."""
     base = base_scene("dvf5000")
     options = ReadOptions(base.machine, axis="X" if name in {None, "rtl"} else "")
-    parts = SPLIT.split(content)[1:] if name else []
+    files = SPLIT.split(content)[1:] if name else []
     sources = [
         open_upload(file.decode("latin-1"), text)
-        for file, text in zip(parts[::2], parts[1::2], strict=True)
+        for file, text in zip(files[::2], files[1::2], strict=True)
     ] or [open_upload("x", content)]
     if name and (kind := find_format(name)).tables is not None:
-        kind.tables(sources, options)
+        parts = [[each] for each in sources] if kind.independent_files else [sources]
+        for part in parts:
+            kind.tables(part, options)
     return build_imported_scene(
         read_errors(sources, options, *([name] if name else [])), base, "fuzz", "x"
     )

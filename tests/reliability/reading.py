@@ -135,7 +135,7 @@ class Reader:
     def __init__(self, folder: Path) -> None:
         from reliability.formats import EVERY
 
-        self._folder, self._formats = folder, {each.name: each for each in EVERY}
+        self.folder, self._formats = folder, {each.name: each for each in EVERY}
         self.by_format: Counter[str] = Counter()
         self.good: Counter[str] = Counter()
         self.slowest_s, self.faults, self._said = 0.0, [], time.monotonic()
@@ -145,10 +145,10 @@ class Reader:
     def read(self, name: str, content: bytes) -> None:
         from warpspace.exceptions import WarpspaceError
 
-        (self._folder / "current").write_bytes(name.encode() + b"\n" + content)
+        (self.folder / "current").write_bytes(name.encode() + b"\n" + content)
         began = time.process_time()
         try:
-            self._formats[name].read(content, self._folder)
+            self._formats[name].read(content, self.folder)
             self.good[name] += 1
         except WarpspaceError as error:
             if len(str(error)) > 20_000:
@@ -176,9 +176,9 @@ class Reader:
         self._said = time.monotonic()
         said = NOTHING | {"by_format": self.by_format, "read": self.good, "ended": ended}
         said |= {"slowest_s": self.slowest_s, "most_mb": self.most_mb, "faults": self.faults[:20]}
-        path = self._folder / "state.new"
+        path = self.folder / "state.new"
         path.write_text(json.dumps(said))
-        path.replace(self._folder / "state.json")
+        path.replace(self.folder / "state.json")
 
     def _fault(self, name: str, content: bytes, what: str) -> None:
         self.faults.append(f"{name}: {what} ({keep(name, content)})")
@@ -191,6 +191,8 @@ def _read_bytes(reader: Reader, count: int, seed: int, only: str = "") -> None:
     formats = [each for each in EVERY if each.name == only] or FORMATS
     seeds = {each.name: each.seeds() for each in formats}
     shares = [each.share for each in formats]
+    for each in formats:  # what is imported then is no time of a changed file
+        each.read(seeds[each.name][0], reader.folder)
     for _ in range(count):
         (each,) = chance.choices(formats, shares)
         words = [*WORDS, *each.words * 3] if each.text else []

@@ -60,10 +60,7 @@ def limit_estimates(estimates: Sequence[Estimates]) -> tuple[Constraint, ...]:
 
 
 def estimate_from_readings(
-    curves: ErrorCurves,
-    sets: Sequence[Readings],
-    instrument: Instrument,
-    watch: ProgressCallback,
+    curves: ErrorCurves, sets: Sequence[Readings], instrument: Instrument, watch: ProgressCallback
 ) -> Iterator[Estimates]:
     """Linearise readings about the exact chain without errors.
 

@@ -315,8 +315,7 @@ Place: TypeAlias = Annotated[tuple[tuple[str, float], ...], PLACE]
 """Axis positions in mm and degrees."""
 Keys: TypeAlias = Annotated[tuple[str, ...], Grammar("KEY,…|all", read_keys, many=True)]
 Limits: TypeAlias = Annotated[
-    tuple[tuple[str, float], ...],
-    Grammar("KEY=±VALUE|±VALUE", read_limits, many=True),
+    tuple[tuple[str, float], ...], Grammar("KEY=±VALUE|±VALUE", read_limits, many=True)
 ]
 """Half widths by parameter, µm or µrad."""
 

@@ -73,7 +73,8 @@ def read_mesh(
         mm_per_unit = UNITS_3MF_MM[name]
     pose, name = scene.graph[nodes[0]] if len(nodes) == 1 else (None, None)
     is_one = hasattr(scene.geometry.get(name), "faces")  # a large one is not copied
-    mesh = scene.geometry[name].apply_transform(pose) if is_one else scene.to_mesh()
+    with np.errstate(all="ignore"):
+        mesh = scene.geometry[name].apply_transform(pose) if is_one else scene.to_mesh()
     if not np.isfinite(mesh.vertices).all():
         raise OptionError(f"{path}: a vertex is not finite")
     farthest = float(np.abs(mesh.vertices).max(initial=0.0))
@@ -82,7 +83,7 @@ def read_mesh(
     is_closed = len(mesh.vertices) <= len(mesh.faces) and _is_closed(mesh.faces)
     if not is_closed:
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    corner = mesh.faces.T
+    corner = mesh.faces.reshape(-1, 3).T
     mesh.update_faces(np.all([corner[at] != corner[at - 1] for at in range(3)], axis=0))
     if not len(mesh.faces):
         raise OptionError(f"{path}: there are no triangles in it")
@@ -230,8 +231,6 @@ def _shape(visual: Any, pose: Array, folders: tuple[Path, Path], meshes: dict[Pa
     mesh.apply_transform(placed)
     mesh.apply_scale(MM_PER_M)
     mesh.apply_transform(pose)
-    if not np.isfinite(mesh.vertices).all():
-        raise WarpspaceError("its shape holds numbers that are not finite; left out")
     return mesh
 
 
@@ -259,9 +258,12 @@ def _mesh(geometry: Any, folders: tuple[Path, Path], meshes: dict[Path, Any]) ->
     if path not in meshes:
         try:
             scene = open_meshes(path, "mesh")
-            loaded = scene.to_mesh()
+            with np.errstate(all="ignore"):
+                loaded = scene.to_mesh()
             loaded.metadata["notes"] = scene.metadata["notes"]
             meshes[path] = loaded if len(loaded.faces) else "it is empty"
+            if not np.isfinite(loaded.vertices).all():
+                meshes[path] = "a vertex is not finite"
         except OptionError as error:
             meshes[path] = str(error)
     mesh = meshes[path]

@@ -19,13 +19,7 @@ from warpspace.calibration.calibration_result import (
     Target,
     describe_target,
 )
-from warpspace.calibration.fit import (
-    Fit,
-    FitOptions,
-    frame_notes,
-    join_residuals,
-    predict_readings,
-)
+from warpspace.calibration.fit import Fit, FitOptions, frame_notes, join_residuals, predict_readings
 from warpspace.calibration.instruments import (
     NO_INSTRUMENT,
     Instrument,
@@ -77,9 +71,7 @@ class Calibrate(Analysis):
     chart_help = "residuals before and after the fit, and the fitted errors"
     has_table = True
     data: Files = option(
-        (),
-        "CSV file of readings, or the name of a bundled one such as tcp_on.csv",
-        required=True,
+        (), "CSV file of readings, or the name of a bundled one such as tcp_on.csv", required=True
     )
     kinds: Kinds = option(
         (),
@@ -177,10 +169,7 @@ class Calibrate(Analysis):
                 files = zip(self.data, kinds, strict=False)
                 again = [read_readings(file, other, kind, self.frame) for file, kind in files]
                 after_mm = rms_mm(Fit.of(other, again, self.fit_options, check_cancelled).after)
-            except (
-                OptionError,
-                SceneError,
-            ):  # cannot run in this sense
+            except (OptionError, SceneError):  # cannot run in this sense
                 continue
             if after_mm <= max(AS_WELL * found.rms_after_mm, NO_RESIDUAL_MM):
                 yield (

@@ -172,10 +172,7 @@ def _print_json(
 
 
 def _list_points(
-    axes: Mapping[str, Array],
-    result: ErrorField,
-    units: Sequence[str],
-    u95: Mapping[str, Array],
+    axes: Mapping[str, Array], result: ErrorField, units: Sequence[str], u95: Mapping[str, Array]
 ) -> None:
     columns = (
         Column("point", "d", leads=True),

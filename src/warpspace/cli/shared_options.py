@@ -202,10 +202,7 @@ csv_option = click.option(
 
 
 def output_option(
-    help_text: str,
-    *endings: str,
-    added: Callable[[], Iterable[str]] = tuple,
-    required: bool = True,
+    help_text: str, *endings: str, added: Callable[[], Iterable[str]] = tuple, required: bool = True
 ) -> Decorator:
     """Build the option --output for a file with one of some endings, or any."""
     kind = OutputFile(*endings, added=added)

@@ -351,11 +351,7 @@ def rotation_gain(lever_mm: ArrayLike, direction: ArrayLike) -> Array:
 
 
 def columns(
-    model: Model,
-    loop: Loop,
-    keys: Sequence[str],
-    coordinates: Coordinates,
-    point_mm: ArrayLike,
+    model: Model, loop: Loop, keys: Sequence[str], coordinates: Coordinates, point_mm: ArrayLike
 ) -> dict[str, JacobianColumn]:
     """Build the Jacobian columns of parameters that act in a loop, at points, [..., 3], mm."""
     sides = {"tool": 1.0, "workpiece": -1.0} if loop == Loop.RELATIVE else {str(loop): 1.0}
@@ -376,11 +372,7 @@ def columns(
 
 
 def jacobian(
-    model: Model,
-    loop: Loop,
-    keys: Sequence[str],
-    coordinates: Coordinates,
-    point_mm: ArrayLike,
+    model: Model, loop: Loop, keys: Sequence[str], coordinates: Coordinates, point_mm: ArrayLike
 ) -> tuple[Array, Array]:
     """Build the Jacobian of position and tool-axis orientation.
 

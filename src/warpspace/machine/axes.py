@@ -185,11 +185,7 @@ _NAMES = {
     (ErrorKind.ORIENTATION, False): ("orientation of {axis} about {low}",) * 2,
 }
 # Of axes along x, y, z, about x, y, z: roll about the motion, pitch about the horizontal normal.
-_LINEAR_ROTATIONS = (
-    ("roll", "pitch", "yaw"),
-    ("pitch", "roll", "yaw"),
-    ("pitch", "yaw", "roll"),
-)
+_LINEAR_ROTATIONS = (("roll", "pitch", "yaw"), ("pitch", "roll", "yaw"), ("pitch", "yaw", "roll"))
 
 
 def _parameter(letter: str, axis: str, *, constant: bool) -> Parameter:

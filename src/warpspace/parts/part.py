@@ -120,9 +120,7 @@ class Part(WorkpieceAnalysis):
         high=MAX_SESSION_U,
     )
     seal: Annotated[str | None, Grammar("FILE", typed_word, is_extended=True)] = option(
-        None,
-        "Write the predicted report with a hash; verify an existing one",
-        unset="none",
+        None, "Write the predicted report with a hash; verify an existing one", unset="none"
     )
     tolerances: tuple[str, str] | None = None  # name and text, instead of `features`
     report: InspectionReport | None = None  # instead of `measured`

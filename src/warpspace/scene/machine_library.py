@@ -178,10 +178,7 @@ NOT_UNIT, ROUNDED = 1e-3, 1e-12  # deviations of the length of a direction from 
 
 
 def read_adjusters(
-    tables: Sequence[Mapping[str, Any]],
-    machine: definition.Machine,
-    key: str,
-    problems: Problems,
+    tables: Sequence[Mapping[str, Any]], machine: definition.Machine, key: str, problems: Problems
 ) -> tuple[adjusters.Adjuster, ...]:
     """Build the adjusters of a machine; note those that are invalid or depend on each other."""
     built: list[adjusters.Adjuster] = []
@@ -208,9 +205,7 @@ def read_adjusters(
 
 
 def _adjuster_problems(
-    adjuster: adjusters.Adjuster,
-    earlier: Sequence[adjusters.Adjuster],
-    machine: definition.Machine,
+    adjuster: adjusters.Adjuster, earlier: Sequence[adjusters.Adjuster], machine: definition.Machine
 ) -> Iterator[tuple[str, str, object]]:
     """List key, problem and value of what is wrong with one adjuster."""
     kind, body = adjuster.kind, adjuster.body

@@ -88,12 +88,18 @@ def corrupted(tmp_path_factory):
     written(folder / "points.ply", points)
     written(folder / "points.glb", points.scene())
     (folder / "points.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n")
+    (folder / "edge.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n")
     (folder / "point.obj").write_text("v -10.0\n", "utf-8")
     (folder / "flat.obj").write_text("v 0 0 0\nv 100 0 0\nv 200 0 0\nf 1 2 3\n")
     for value in (np.nan, np.inf, 2.0**40):
         data = bytearray(written(folder / "a.stl", box()).read_bytes())
         struct.pack_into("<f", data, 84 + 12, value)
         (folder / f"{value}.stl").write_bytes(data)
+    turned = trimesh.Scene()
+    turned.add_geometry(box(), transform=trimesh.transformations.rotation_matrix(1.0, (1, 2, 3)))
+    content = turned.export(file_type="glb")
+    largest = struct.pack("<f", box().vertices.max())
+    (folder / "inf.glb").write_bytes(content.replace(largest, struct.pack("<f", np.inf)))
     content = trimesh.creation.box((20.0, 30.0, 40.0)).export(file_type="ply", encoding="ascii")
     head, faces = content.split(b"end_header\n")
     far = re.sub(rb"(?m)^3 7 ", b"3 70 ", faces)
@@ -108,10 +114,12 @@ def corrupted(tmp_path_factory):
         ("points.ply", "there are no triangles", {}),
         ("points.glb", "there are no triangles", {}),
         ("points.obj", "there are no triangles", {}),
+        ("edge.obj", "there are no triangles", {}),
         ("point.obj", ".*without three coordinates", {}),
         ("flat.obj", "all of its triangles", {}),
         ("nan.stl", "a vertex is not finite", {}),
         ("inf.stl", "a vertex is not finite", {}),
+        ("inf.glb", "a vertex is not finite", {}),
         ("1099511627776.0.stl", "a vertex is at 1.1e.12; expected at most 1e.09", {}),
         ("box.ply", "no PLY file .* refers to a missing vertex", {}),
         ("a.iges", r"unknown ending; expected one of \.stl", {}),

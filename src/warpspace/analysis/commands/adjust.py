@@ -10,12 +10,7 @@ import numpy as np
 
 from warpspace.analysis import description
 from warpspace.analysis.act_planning import Act, Planner, is_placement
-from warpspace.analysis.adjustment_log import (
-    Stiffness,
-    extend_log,
-    learn_stiffness,
-    read_log,
-)
+from warpspace.analysis.adjustment_log import Stiffness, extend_log, learn_stiffness, read_log
 from warpspace.analysis.adjustment_search import Objective, Search, Volume
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
 from warpspace.analysis.options import (
@@ -33,13 +28,7 @@ from warpspace.analysis.options import (
 from warpspace.analysis.statistics import Summary, volume_statistics
 from warpspace.analysis.uncertainty import propagation
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import (
-    ErrorBasis,
-    ErrorField,
-    View,
-    amplitudes_of,
-    placed_words,
-)
+from warpspace.field.evaluate import ErrorBasis, ErrorField, View, amplitudes_of, placed_words
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import Parameter, parameter
@@ -166,10 +155,7 @@ class Adjust(description.Analysis):
         choice_labels={"rms": "RMS of the whole volume", "max": "largest |E| of the volume"},
     )
     count: int = option(
-        3,
-        "Largest number of adjustments in a set",
-        low=REPAIR_COUNT[0],
-        high=REPAIR_COUNT[1],
+        3, "Largest number of adjustments in a set", low=REPAIR_COUNT[0], high=REPAIR_COUNT[1]
     )
     adjustable: Keys = option(
         (),
@@ -178,9 +164,7 @@ class Adjust(description.Analysis):
         " replaces",
     )
     limit: Limits = option(
-        (),
-        "Largest change of one error or of each, in µm or µrad",
-        unset=f"±{DEFAULT_LIMIT:g}",
+        (), "Largest change of one error or of each, in µm or µrad", unset=f"±{DEFAULT_LIMIT:g}"
     )
     unconstrained: bool = option(
         False, "Also propose values beyond the tolerances, and sets that increase the mean"

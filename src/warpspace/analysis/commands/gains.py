@@ -200,10 +200,7 @@ def _larger(
 
 
 def _sweep(
-    model: Model,
-    loop: Loop,
-    ranges: Mapping[str, tuple[float, float]],
-    step_deg: float | None,
+    model: Model, loop: Loop, ranges: Mapping[str, tuple[float, float]], step_deg: float | None
 ) -> Iterator[dict[str, Array]]:
     sides = ("tool", "workpiece") if loop is Loop.RELATIVE else (str(loop),)
     axes = [axis for side in sides for axis in model.machine.branch(side)]

@@ -64,9 +64,7 @@ formats.register_format(
 )
 @click.option("--port", type=int, help="Port to serve on.  [the next free one from 8080]")
 @click.option(
-    "--shared",
-    is_flag=True,
-    help="Shared review: all tabs show and edit the same state.",
+    "--shared", is_flag=True, help="Shared review: all tabs show and edit the same state."
 )
 @click.option(
     "--allow-host",
@@ -135,9 +133,7 @@ def view(
     "File to write: .png, .svg or .pdf; animated .gif, .webp or .mp4.", *FIGURES, *MOVING
 )
 @click.option(
-    "--figure",
-    metavar="NAME",
-    help=f"Figure to draw: {', '.join(figure_names())}.  [error-map]",
+    "--figure", metavar="NAME", help=f"Figure to draw: {', '.join(figure_names())}.  [error-map]"
 )
 @choice_option(
     "--motion",
@@ -283,13 +279,7 @@ def compare(
 @direction_option
 @force_option
 def export(
-    scene: str,
-    output: str,
-    loop: str | None,
-    direction: str | None,
-    *,
-    force: bool,
-    **options: Any,
+    scene: str, output: str, loop: str | None, direction: str | None, *, force: bool, **options: Any
 ) -> None:
     """Export SCENE for other programs.
 
