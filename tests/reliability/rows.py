@@ -72,7 +72,7 @@ ROWS = {
 def put_row(text: str, name: str, outcome: Outcome, date: str) -> str:
     """Write count, date and result of a row; the count is what was run, of the full one."""
     held = f"held: {outcome.result}" if not outcome.faults else f"**fails**: {outcome.faults[0]}"
-    clean = re.sub(r"\s+", " ", held).replace("|", "\\|")[:600]
+    clean = re.sub(r"\s+", " ", held).replace("|", "\\|")[:2000]
     count = f"{outcome.count:,} {ROWS[name].unit}"
     if outcome.count < ROWS[name].full:
         count += f" (of {ROWS[name].full:,})"

@@ -251,9 +251,9 @@ def _read_block(source: Source, block: Block) -> measured.ImportedErrors:
 def _check_header(
     at: SourceLine, names: Sequence[str], arguments: Sequence[str], ignored: Sequence[str]
 ) -> None:
-    known = {*arguments, *ignored}
+    accepted = {*arguments, *ignored}
     for name in names:
-        if name not in known and not error_name(name):
+        if name not in accepted and not error_name(name):
             at.refuse(f"column {name!r}", "arguments X Y Z A B C and parameters such as EXX or C0B")
     repeated = list_repeated(names)
     if repeated:
