@@ -2,7 +2,6 @@
 
 import io
 import math
-from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,7 +18,7 @@ from warpspace.machine.axes import MAX_AXES, direction_index, is_axis_name, is_l
 from warpspace.machine.errors import ToleranceSet
 from warpspace.scene.model import Scene, spanning_axes
 from warpspace.scene.scene_writer import scene_to_toml
-from warpspace.scene.text_files import one_line, read_text
+from warpspace.scene.text_files import list_repeated, one_line, read_text
 from warpspace.units import Array
 
 MOVING = ("revolute", "continuous", "prismatic")
@@ -101,7 +100,7 @@ def not_installed() -> OptionError:
 def _problems(robot: Any) -> Iterable[str]:
     links = [link.name for link in robot.links]
     for what, names in (("link", links), ("joint", [joint.name for joint in robot.joints])):
-        for name in sorted(str(name) for name, count in Counter(names).items() if count > 1):
+        for name in sorted(map(str, list_repeated(names))):
             yield f"{what} {name!r} occurs twice; expected each name once"
     if not links:
         yield "has no link"
