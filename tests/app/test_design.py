@@ -17,6 +17,9 @@ from warpspace.app.browser import actions as do
 from warpspace.app.documents.output_services import Services
 from warpspace.app.drawing.around import STROKES, draw_surroundings
 from warpspace.app.drawing.labels import point_labels
+from warpspace.app.evaluation import live_model
+from warpspace.app.evaluation.cache import Cache
+from warpspace.app.evaluation.compare import applied
 from warpspace.app.evaluation.scene_overlays import planned_adjusters
 from warpspace.app.panels import design
 from warpspace.app.panels.improve import AdjustPanel
@@ -35,6 +38,7 @@ SCENE = replace(PROPOSED, reference=None)
 OTHER = load_scene("machine_trunnion_ac")
 HOSTILE = "<script>alert(1)</script>"
 KEYS = ("EXX", "EYX", "EA0Z")
+build = live_model._build
 
 
 def ran(part, state):
@@ -67,6 +71,20 @@ def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
     assert "reduces the error by 1 % or more" in section(part, applied)
     assert part.handle(applied, do.Apply("adjust", 9)) is applied
     assert part.handle(state, do.Apply("best", 1)) is state
+
+
+def test_cards_of_a_repair_show_what_is_drawn_and_leave_no_responses_in_the_cache(monkeypatch):
+    part, built = lone_part(AdjustPanel, "adjust"), []
+    monkeypatch.setattr(live_model, "CACHE", Cache(400_000_000))
+    monkeypatch.setattr(live_model, "_build", lambda of: built.append(of) or build(of))
+    LIVE.evaluate(START)
+    ran(part, replace(START, forms={"adjust.grid": "5"}))
+    assert len(part.outcome.cards) > 1
+    assert len(built) == 1  # of what is drawn; one more for each bent guide would stay
+    for change, card in part.outcome.cards:
+        numbers = LIVE.evaluate(applied(START, change.scene)).statistics
+        for name in ("mean_um", "rms_um", "max_um"):
+            assert f" → {getattr(numbers, name):.1f}" in re.sub(r"<[^>]+>", "", card)
 
 
 def test_the_selected_acts_are_drawn_at_their_adjusters_while_the_section_is_open():

@@ -18,6 +18,7 @@ from markupsafe import Markup
 from warpspace.analysis.description import Analysis, Change, Result
 from warpspace.analysis.options import Option
 from warpspace.analysis.registry import Entry
+from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.app.browser import actions as do
 from warpspace.app.browser.html import EMPTY, join, number, tag
 from warpspace.app.browser.page import error_words
@@ -26,16 +27,16 @@ from warpspace.app.evaluation import compare
 from warpspace.app.evaluation.cache import exclusive_work
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import block_html, result_html
-from warpspace.app.panels.file_dialogs import PLAIN, limit_words
+from warpspace.app.panels.file_dialogs import limit_words
 from warpspace.app.panels.panel import Context, Job, Jobs, Section, alert, on
 from warpspace.app.state.app_state import AppState, Side
 from warpspace.app.state.form_values import LONGEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
 from warpspace.exceptions import WarpspaceError
-from warpspace.field.grid import DEFAULT_NODES
+from warpspace.field.grid import DEFAULT_NODES, build_grid
 from warpspace.machine.axes import parameter
 from warpspace.picture.formatting import spell_at
-from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, evaluate_grid
 
 TITLES = {
     "gains": "Error gains", "line": "Along a line",
@@ -335,10 +336,17 @@ def _change_html(state: AppState, change: Change) -> Markup:
             moved.append((-abs(b - a), line))
     steps = [*change.steps, *(line for _, line in sorted(moved))] or [change.label]
     try:
-        before, after = (PLAIN.evaluate(state).statistics for state in (before_state, after_state))
+        before, after = _statistics(before_state), _statistics(after_state)
     except WarpspaceError:
         return HTML.change(steps, MOST_STEPS)
     return HTML.change(steps, MOST_STEPS, before, after)
+
+
+def _statistics(state: AppState) -> Statistics:
+    """Summarise the volume, without a response that the cache of the pictures would keep."""
+    scene = state.active_scene()
+    grid = build_grid(scene.model, scene.workspace.moved(state.positions), state.grid_nodes)
+    return volume_statistics(evaluate_grid(scene, grid, state.view()), grid)
 
 
 def _example(option: Option) -> str:
