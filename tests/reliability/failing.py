@@ -109,7 +109,7 @@ class Review:
             self.set("EXX", BAD)
             self.set("EZX", value + 1.0)
         if way == "undo":
-            value += 1.0
+            value = round(value + 1.0, 2)  # as it is typed
             self.set("EXX", value)
         elif way == "redo":
             first.say(do.Signal.UNDO)
