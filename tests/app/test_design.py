@@ -38,7 +38,6 @@ SCENE = replace(PROPOSED, reference=None)
 OTHER = load_scene("machine_trunnion_ac")
 HOSTILE = "<script>alert(1)</script>"
 KEYS = ("EXX", "EYX", "EA0Z")
-build = live_model._build
 
 
 def ran(part, state):
@@ -74,7 +73,7 @@ def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
 
 
 def test_cards_of_a_repair_show_what_is_drawn_and_leave_no_responses_in_the_cache(monkeypatch):
-    part, built = lone_part(AdjustPanel, "adjust"), []
+    part, built, build = lone_part(AdjustPanel, "adjust"), [], live_model._build
     monkeypatch.setattr(live_model, "CACHE", Cache(400_000_000))
     monkeypatch.setattr(live_model, "_build", lambda of: built.append(of) or build(of))
     LIVE.evaluate(START)

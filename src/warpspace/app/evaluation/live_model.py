@@ -27,7 +27,7 @@ from warpspace.machine.axes import parameter
 from warpspace.machine.errors import Constant
 from warpspace.picture import model
 from warpspace.picture.traces import TraceGroup, TraceLines, build_traces
-from warpspace.scene.model import Scene, grid_basis
+from warpspace.scene.model import Scene, evaluate_grid, grid_basis
 from warpspace.units import Array
 
 WITHIN_LIMIT = 0.27  # place on the scale of signed values: colour of values within the limit
@@ -208,6 +208,13 @@ def _build(state: AppState) -> Response:
         keys = scene.parameter_keys
         bases.append(build_basis(scene.model, scene.errors, keys, at, view, point))
     return tuple(zip((grid, *groups), bases, strict=True))
+
+
+def evaluate_state(state: AppState) -> tuple[Grid, ErrorField]:
+    """Evaluate the grid of a state that is not drawn: no response is kept for it."""
+    scene = state.active_scene()
+    grid = build_grid(scene.model, scene.workspace, state.nodes)
+    return grid, evaluate_grid(scene, grid, scene.view(state.loop))
 
 
 @dataclass(frozen=True)

@@ -18,13 +18,14 @@ from markupsafe import Markup
 from warpspace.analysis.description import Analysis, Change, Result
 from warpspace.analysis.options import Option
 from warpspace.analysis.registry import Entry
-from warpspace.analysis.statistics import Statistics, volume_statistics
+from warpspace.analysis.statistics import volume_statistics
 from warpspace.app.browser import actions as do
 from warpspace.app.browser.html import EMPTY, join, number, tag
 from warpspace.app.browser.page import error_words
 from warpspace.app.browser.templates import Templates
 from warpspace.app.evaluation import compare
 from warpspace.app.evaluation.cache import exclusive_work
+from warpspace.app.evaluation.live_model import evaluate_state
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import block_html, result_html
 from warpspace.app.panels.file_dialogs import limit_words
@@ -33,10 +34,10 @@ from warpspace.app.state.app_state import AppState, Side
 from warpspace.app.state.form_values import LONGEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
 from warpspace.exceptions import WarpspaceError
-from warpspace.field.grid import DEFAULT_NODES, build_grid
+from warpspace.field.grid import DEFAULT_NODES
 from warpspace.machine.axes import parameter
 from warpspace.picture.formatting import spell_at
-from warpspace.scene.model import Scene, evaluate_grid
+from warpspace.scene.model import Scene
 
 TITLES = {
     "gains": "Error gains", "line": "Along a line",
@@ -336,17 +337,13 @@ def _change_html(state: AppState, change: Change) -> Markup:
             moved.append((-abs(b - a), line))
     steps = [*change.steps, *(line for _, line in sorted(moved))] or [change.label]
     try:
-        before, after = _statistics(before_state), _statistics(after_state)
+        before, after = (
+            volume_statistics(field, grid)
+            for grid, field in map(evaluate_state, (before_state, after_state))
+        )
     except WarpspaceError:
         return HTML.change(steps, MOST_STEPS)
     return HTML.change(steps, MOST_STEPS, before, after)
-
-
-def _statistics(state: AppState) -> Statistics:
-    """Summarise the volume, without a response that the cache of the pictures would keep."""
-    scene = state.active_scene()
-    grid = build_grid(scene.model, scene.workspace.moved(state.positions), state.grid_nodes)
-    return volume_statistics(evaluate_grid(scene, grid, state.view()), grid)
 
 
 def _example(option: Option) -> str:

@@ -12,6 +12,7 @@ from markupsafe import Markup
 from warpspace.analysis.convention_costs import Effect, convention_costs, measure_change
 from warpspace.app.browser import actions as do
 from warpspace.app.browser.templates import Templates
+from warpspace.app.evaluation.live_model import evaluate_state
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.panel import Section, on
 from warpspace.app.state.app_state import AppState
@@ -19,10 +20,9 @@ from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import linear_spans
 from warpspace.app.state.tree import EXAMPLE
 from warpspace.app.state.typed_numbers import read_positions
-from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Model, convention_names, find_convention
 from warpspace.machine.axes import TravelDirection, is_linear
-from warpspace.scene.model import Scene, evaluate_grid
+from warpspace.scene.model import Scene
 from warpspace.units import Array
 
 HTML = Templates("conventions")
@@ -141,8 +141,8 @@ def effects_of(state: AppState) -> dict[str, Effect]:
 
 
 def _error(state: AppState) -> tuple[Array, Array]:
-    grid = build_grid(state.scene.model, state.scene.workspace.moved(state.positions), state.nodes)
-    return grid.weights, evaluate_grid(state.active_scene(), grid, state.view()).error_um
+    grid, field = evaluate_state(state)
+    return grid.weights, field.error_um
 
 
 # --- The section ----------------------------------------------------------------------------------
